@@ -1,0 +1,13 @@
+// The measurements of the bench as tables for people.
+#pragma once
+
+#include <taut/apps/program/bench.hpp>
+
+namespace taut {
+
+/// Rates of the machine per number of threads; the counts; a line per material, precision and size;
+/// the variants.
+std::string bench_tables(std::vector<BenchRow> const& rows,
+                         std::vector<MachineRates> const& machines);
+
+}  // namespace taut

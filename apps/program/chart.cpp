@@ -1,0 +1,63 @@
+#include <taut/apps/program/chart.hpp>
+#include <taut/apps/program/chart_table.hpp>
+#include <taut/apps/program/render_python.hpp>
+#include <taut/core/io/file.hpp>
+#include <taut/core/report/error.hpp>
+
+#include <Kokkos_Core.hpp>
+
+#include <cmath>
+
+namespace taut {
+
+std::vector<Contestant> contestants(std::filesystem::path const& scene, SceneChanges const& changes,
+                                    std::vector<ChartMethod> const& methods, int max_iterations) {
+  std::vector<std::string> const rules{"solver.stopping=decrement_window", "solver.tolerance=1e-12",
+                                       fmt::format("solver.max_iterations={}", max_iterations)};
+  std::vector<Contestant> all;
+  for (ChartMethod const& method : methods)
+    all.push_back({method.label, load_scene(scene, with(with(changes, rules), method.overrides))});
+  return all;
+}
+
+std::string describe(Scene const& scene, SceneGeometry const& geometry) {
+  std::string materials;
+  for (MaterialParameters const& m : geometry.materials) {
+    materials += fmt::format("{}{} (E = {:g} Pa, nu = {:g})", materials.empty() ? "" : ", ",
+                             m.model, m.young, m.poisson);
+  }
+  constexpr char const* schemes[] = {"implicit Euler", "BDF2", "quasi-static"};
+  return fmt::format(
+      "# scene = {}\n# tets = {}\n# vertices = {}\n# materials = {}\n# integrator = {}\n"
+      "# step_s = {:g}\n# threads = {}\n",
+      scene.name, geometry.mesh.tets.size(), geometry.mesh.points.size(), materials,
+      schemes[static_cast<int>(scene.scheme)], scene.step,
+      Kokkos::DefaultExecutionSpace().concurrency());
+}
+
+std::string field(double number) {
+  return std::isfinite(number) ? fmt::format("{:.6g}", number) : std::string();
+}
+
+int chart_command(ChartOptions const& options) {
+  std::filesystem::path const scene = find_scene(options.scene.scene);
+  std::filesystem::path const out =
+      options.out.empty() ? std::filesystem::path("charts") / scene.stem() : options.out;
+  std::filesystem::path const data = out / "data.csv";
+  if (!options.force && std::filesystem::exists(data)) {
+    throw Error("{}: a chart is there already: choose another --out or replace it with --force",
+                out.string());
+  }
+  std::vector<ChartMethod> const methods = parse_methods(options.methods);
+  write_file_atomically(data, options.sweep ? sweep_methods(scene, options, methods)
+                                            : compare_methods(scene, options, methods));
+  fmt::print("data     {}\n", data.string());
+  if (options.draw) {
+    run_drawing({"draw_chart.py", {"matplotlib"}, {"matplotlib>=3.7"}},
+                {data.string(), (out / "chart").string()}, data);
+    fmt::print("chart    {}\n", (out / "chart.png").string());
+  }
+  return 0;
+}
+
+}  // namespace taut

@@ -1,0 +1,38 @@
+// `taut chart`: what accuracy a method reaches, after how many iterations and seconds. All methods
+// start from the same state, that before one time step of a scene, and are measured against an
+// over-solved solution of that step: never against their own residuals, which mean something else
+// for every method, preconditioner and stiffness.
+//
+// With `sweep`, the iterations and seconds to an error of `target` against the swept value of the
+// scene.
+#pragma once
+
+#include <taut/apps/program/commands.hpp>
+
+#include <optional>
+
+namespace taut {
+
+struct ChartOptions {
+  SceneArguments scene;
+  /// NAME[:KEY=VALUE...] with the keys of [solver], as in "dk:preconditioner=jacobi"; empty or
+  /// "all": every method with the scene's own options.
+  std::vector<std::string> methods;
+  std::vector<int>
+      frames;  ///< time steps to compare, counted from 1; empty: the tenth, or the last
+  bool sweep = false;
+  double target = 0.01;          ///< a method that ends above this error has failed
+  double lowest = 1e-8;          ///< below this error a curve ends
+  std::optional<double> length;  ///< m, what errors are relative to; by default the step's motion
+  int max_iterations = 2000;
+  double max_seconds = 60;    ///< per method, while its errors are recorded
+  int repetitions = 3;        ///< of the runs that are timed
+  std::filesystem::path out;  ///< empty: charts/NAME
+  bool force = false;         ///< replaces a chart that is there
+  bool draw = true;           ///< false: data.csv alone, no Python
+};
+
+/// Writes data.csv, chart.svg and chart.png. Throws Error.
+int chart_command(ChartOptions const& options);
+
+}  // namespace taut

@@ -1,0 +1,55 @@
+// How far positions x are from the solution x* of a time step: the error of position, and that of
+// energy,
+//
+//   E(x) - E(x*) = 1/2 |d|^2_M + c h^2 Sum_e W (Psi(F* + dF) - Psi(F*) - P(F*) : dF),   d = x - x*,
+//
+// evaluated in fp64 and independently of the methods under test. The gradient of E at x* is zero,
+// so forces and the inertial target drop out, and with them the cancellation of large numbers;
+// where x still moves prescribed vertices, the work of their reactions is left out.
+#pragma once
+
+#include <taut/apps/program/scene_geometry.hpp>
+#include <taut/core/fem/rest_shape.hpp>
+
+#include <optional>
+
+namespace taut {
+
+class StepMeasure {
+public:
+  /// `before` and `solution`: positions at the beginning of step number `step` (from 1) and its
+  /// over-solved end. Errors of position are relative to `length` (m) or, by default, to the
+  /// largest motion in the step. Keeps a reference to `geometry`. Throws Error if nothing moves in
+  /// the step.
+  StepMeasure(Scene const& scene, SceneGeometry const& geometry, int step,
+              std::vector<Point> const& before, std::vector<Point> solution,
+              std::optional<double> length = {});
+
+  double length() const { return length_; }  ///< m
+
+  /// max_i |x_i - x*_i| / length
+  double position_error(std::vector<Point> const& x) const;
+  /// (E(x) - E(x*)) / (E(before) - E(x*)); NaN where E is not defined.
+  double energy_gap(std::vector<Point> const& x) const { return energy_above(x) / unit_energy_; }
+  /// E(x) - E(x*), kg m^2.
+  double energy_above(std::vector<Point> const& x) const;
+
+private:
+  struct Part {
+    std::string model;
+    std::vector<std::int32_t> tets;
+  };
+  template <class Model>
+  double strain_energy_above(Part const& part, std::vector<Point> const& x) const;
+  Mat3<double> gradient(std::int32_t tet, std::vector<Point> const& x) const;
+
+  SceneGeometry const& geometry_;
+  std::vector<Point> solution_;
+  std::vector<RestShape> shapes_;
+  std::vector<double> mass_;  ///< kg; zero in a quasi-static step
+  std::vector<Part> parts_;
+  double scale_ = 1;  ///< c h^2, s^2
+  double length_ = 0, unit_energy_ = 1;
+};
+
+}  // namespace taut

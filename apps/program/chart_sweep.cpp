@@ -1,0 +1,56 @@
+#include <taut/apps/program/chart_table.hpp>
+#include <taut/apps/program/chart_trace.hpp>
+#include <taut/core/report/error.hpp>
+
+#include <algorithm>
+#include <limits>
+
+namespace taut {
+
+std::string sweep_methods(std::filesystem::path const& file, ChartOptions const& options,
+                          std::vector<ChartMethod> const& methods) {
+  Scene const whole = load_scene(file, options.scene.changes);
+  if (!whole.sweep) {
+    throw Error("{}: the scene has no [sweep]: give it a key and values, or leave --sweep out",
+                file.string());
+  }
+  if (options.frames.size() > 1) throw Error("--frames: a sweep compares one frame, name one");
+  int const frame = options.frames.empty() ? std::min(10, whole.frames) : options.frames.front();
+  // A method has proven itself well below the target: an error may rise again.
+  TraceLimits const limits{options.target / 10, options.max_seconds, options.repetitions};
+
+  std::string header, table = "value,method,iterations,seconds,position_error,ended\n";
+  for (double value : whole.sweep->values) {
+    std::vector<std::string> const member{fmt::format("{}={}", whole.sweep->key, value)};
+    SceneChanges const changes = with(options.scene.changes, member);
+    std::vector<Contestant> const all = contestants(file, changes, methods, options.max_iterations);
+    Scene const scene = load_scene(file, changes);
+    SceneGeometry const geometry = build_geometry(scene);
+    if (header.empty()) {
+      header = "# kind = sweep\n" + describe(scene, geometry) +
+               fmt::format("# target = {:g}\n# key = {}\n# frame = {}\n", options.target,
+                           whole.sweep->key, frame);
+    }
+    ReferenceStep const step = Reference(file, changes, geometry).advance_to(frame);
+    StepMeasure const measure(scene, geometry, frame, step.start, step.solution, options.length);
+    header += fmt::format("# value {:g} length_m = {:.6g}\n", value, measure.length());
+    fmt::print("{}, step {}: errors relative to {:.4g} m\n", member[0], frame, measure.length());
+    for (Contestant const& one : all) {
+      auto const simulation = Simulation::create(one.scene, geometry);
+      Trace const found = trace(*simulation, step, measure, limits);
+      auto const reached = found.reached(options.target);
+      double const last = found.points.empty() ? std::numeric_limits<double>::quiet_NaN()
+                                               : found.points.back().position_error;
+      table += fmt::format(
+          "{:g},{},{},{},{},{}\n", value, one.label, reached ? std::to_string(*reached) : "",
+          reached ? field(found.points[*reached - 1].seconds) : "", field(last), found.ended);
+      fmt::print("  {:<26} {}\n", one.label,
+                 reached ? fmt::format("{} iterations, {:.4g} s", *reached,
+                                       found.points[*reached - 1].seconds)
+                         : fmt::format("not reached: {}, error {:.2e}", found.ended, last));
+    }
+  }
+  return header + table;
+}
+
+}  // namespace taut

@@ -1,0 +1,41 @@
+// The data behind a chart: lines "# name = value" that say what was measured, then comma-separated
+// rows under a line of column names.
+#pragma once
+
+#include <taut/apps/program/chart.hpp>
+#include <taut/apps/program/chart_method.hpp>
+#include <taut/apps/program/scene_geometry.hpp>
+
+#include <string>
+#include <vector>
+
+namespace taut {
+
+/// A method with the scene that runs it, which is also what checks its options.
+struct Contestant {
+  std::string label;
+  Scene scene;
+};
+
+/// The scene with `changes` once per method: stopping rules out of the way, the method's options on
+/// top. Throws Error.
+std::vector<Contestant> contestants(std::filesystem::path const& scene, SceneChanges const& changes,
+                                    std::vector<ChartMethod> const& methods, int max_iterations);
+
+/// What every chart says about its scene and machine.
+std::string describe(Scene const& scene, SceneGeometry const& geometry);
+
+/// A number as a field of a row: empty if it is not one.
+std::string field(double number);
+
+/// frame,method,iteration,seconds,position_error,energy_gap,ended: a row per iteration; the last
+/// row of a method says how it ended (see Trace).
+std::string compare_methods(std::filesystem::path const& scene, ChartOptions const& options,
+                            std::vector<ChartMethod> const& methods);
+
+/// value,method,iterations,seconds,position_error,ended: a row per method and swept value, with
+/// what it took to bring the error to `target`; iterations and seconds are empty where that failed.
+std::string sweep_methods(std::filesystem::path const& scene, ChartOptions const& options,
+                          std::vector<ChartMethod> const& methods);
+
+}  // namespace taut

@@ -1,0 +1,155 @@
+#include <taut/apps/program/chart_method.hpp>
+#include <taut/apps/program/chart_trace.hpp>
+#include <taut/core/report/error.hpp>
+#include <taut/core/report/timer.hpp>
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+namespace taut {
+namespace {
+
+std::vector<std::string> const reference_solver{"solver.method=newton",
+                                                "solver.precision=fp64",
+                                                "solver.line_search=newton_armijo",
+                                                "solver.preconditioner=block_jacobi",
+                                                "solver.refresh=always",
+                                                "solver.stopping=decrement_window",
+                                                "solver.tolerance=1e-12",
+                                                "solver.max_iterations=200",
+                                                "solver.linear_tolerance=1e-3",
+                                                "solver.max_linear_iterations=100000"};
+
+/// Thrown by an observer that has seen enough; the state is then that before the step.
+struct Enough {};
+
+/// The state in the number types that the simulation keeps. (One of fp32 rounds it.)
+void restore(Simulation& simulation, Checkpoint const& state) {
+  Checkpoint own;
+  simulation.save(own);
+  for (auto& [name, array] : own.arrays) {
+    if (auto* narrow = std::get_if<std::vector<float>>(&array)) {
+      std::vector<double> const& wide = state.get<double>(name);
+      std::transform(wide.begin(), wide.end(), narrow->begin(),
+                     [](double number) { return static_cast<float>(number); });
+    } else {
+      array = state.arrays.at(name);
+    }
+  }
+  simulation.restore(own);
+}
+
+char const* brief(Stop stop) {
+  switch (stop) {
+    case Stop::budget_iterations:
+    case Stop::budget_seconds:
+      return "budget";
+    case Stop::stalled:
+      return "stalled";
+    case Stop::non_finite:
+      return "not finite";
+    default:
+      return "converged";
+  }
+}
+
+/// The energy is evaluated by a serial loop: at every early iteration, then ever more rarely.
+bool is_sampled(std::size_t iteration) {
+  std::size_t spacing = 1;
+  while (iteration > 32 * spacing) spacing *= 2;
+  return iteration % spacing == 0;
+}
+
+void record(Trace& trace, Simulation& simulation, StepMeasure const& measure,
+            TraceLimits const& limits) {
+  double const unknown = std::numeric_limits<double>::quiet_NaN();
+  Timer const timer;
+  auto const observe = [&](IterationView const& view) {
+    std::vector<Point> const x = view.positions();
+    double const error = measure.position_error(x);
+    bool const ends = error <= limits.lowest || timer.seconds() > limits.max_seconds;
+    bool const sampled = ends || is_sampled(trace.points.size() + 1);
+    trace.points.push_back({unknown, error, sampled ? measure.energy_gap(x) : unknown});
+    if (!ends) return;
+    trace.ended = error <= limits.lowest ? "accurate" : "budget";
+    throw Enough();
+  };
+  try {
+    trace.ended = brief(simulation.step(observe).stop);
+  } catch (Enough const&) {
+  } catch (Error const&) {
+    // The reference went through this step from the same state, so the scene is not to blame.
+    trace.ended = "not finite";
+  }
+}
+
+void take_time(Trace& trace, Simulation& simulation) {
+  std::size_t iteration = 0;
+  Timer const timer;
+  auto const observe = [&](IterationView const&) {
+    double& seconds = trace.points[iteration].seconds;
+    seconds = std::fmin(seconds, timer.seconds());
+    if (++iteration == trace.points.size()) throw Enough();
+  };
+  try {
+    simulation.step(observe);
+  } catch (Enough const&) {
+  }
+}
+
+}  // namespace
+
+Reference::Reference(std::filesystem::path const& scene, SceneChanges const& changes,
+                     SceneGeometry const& geometry)
+    : simulation_(
+          Simulation::create(load_scene(scene, with(changes, reference_solver)), geometry)) {}
+
+ReferenceStep Reference::advance_to(int step) {
+  if (step <= simulation_->steps()) {
+    throw Error("--frames {}: name frames from 1 on, each once, in ascending order", step);
+  }
+  ReferenceStep result;
+  result.step = step;
+  while (simulation_->steps() + 1 < step) simulation_->step();
+  simulation_->save(result.before);
+  result.start = simulation_->positions();
+
+  std::vector<Point> last = result.start, before_last = last;
+  NewtonReport const report = simulation_->step(
+      [&](IterationView const& view) { before_last = std::exchange(last, view.positions()); });
+  result.solution = simulation_->positions();
+  result.iterations = report.iterations;
+  result.stop = report.stop;
+  if (!report.converged() && report.stop != Stop::stalled) {
+    throw Error("step {}: the reference does not converge ({}): compare another one with --frames",
+                step, to_string(report.stop));
+  }
+  result.last_move = 0;
+  for (std::size_t i = 0; i < last.size(); ++i)
+    result.last_move = std::max(
+        result.last_move, std::hypot(last[i][0] - before_last[i][0], last[i][1] - before_last[i][1],
+                                     last[i][2] - before_last[i][2]));
+  return result;
+}
+
+std::optional<int> Trace::reached(double target) const {
+  std::size_t first = points.size();
+  while (first > 0 && points[first - 1].position_error <= target) --first;
+  if (first == points.size()) return {};
+  return static_cast<int>(first) + 1;
+}
+
+Trace trace(Simulation& simulation, ReferenceStep const& reference, StepMeasure const& measure,
+            TraceLimits const& limits) {
+  Trace trace;
+  restore(simulation, reference.before);
+  record(trace, simulation, measure, limits);
+  for (int run = 0; run < limits.repetitions && !trace.points.empty(); ++run) {
+    restore(simulation, reference.before);
+    take_time(trace, simulation);
+  }
+  return trace;
+}
+
+}  // namespace taut

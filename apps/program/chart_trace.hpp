@@ -1,0 +1,64 @@
+// One time step by one method, seen against the step's solution after every iteration.
+#pragma once
+
+#include <taut/apps/program/chart_measure.hpp>
+#include <taut/apps/program/simulation.hpp>
+
+#include <optional>
+
+namespace taut {
+
+/// A step of a scene: the state that every method starts from, and where it should end.
+struct ReferenceStep {
+  int step;                  ///< number, from 1
+  Checkpoint before;         ///< fp64
+  std::vector<Point> start;  ///< positions in `before`
+  std::vector<Point> solution;
+  int iterations;
+  Stop stop;
+  double last_move;  ///< m, of the reference's last iteration: what it can tell apart
+};
+
+/// The scene stepped by projected Newton in fp64 until no more can be gained.
+class Reference {
+public:
+  /// `changes` choose the scene, their solver's options apart. `geometry` is that of the scene.
+  Reference(std::filesystem::path const& scene, SceneChanges const& changes,
+            SceneGeometry const& geometry);
+
+  /// Takes steps until number `step` is done. Throws Error if that is not ahead, or if the
+  /// reference itself does not converge.
+  ReferenceStep advance_to(int step);
+
+private:
+  std::unique_ptr<Simulation> simulation_;
+};
+
+struct TracePoint {
+  double seconds;         ///< from the beginning of the step, the fastest of all runs
+  double position_error;  ///< see StepMeasure
+  double energy_gap;      ///< NaN where it was not evaluated
+};
+
+struct TraceLimits {
+  double lowest = 0;        ///< position error that ends the step
+  double max_seconds = 60;  ///< of the run whose errors are recorded
+  int repetitions = 3;      ///< runs that are timed
+};
+
+struct Trace {
+  std::vector<TracePoint> points;  ///< after iterations 1, 2, ...
+  /// "accurate" if `lowest` was reached, else what ended the step: "budget", "stalled", "not
+  /// finite", "converged" by the method's own rule.
+  std::string ended;
+
+  /// The first iteration (from 1) from which on the error of position stays at or below `target`.
+  std::optional<int> reached(double target) const;
+};
+
+/// Runs the step once with its errors recorded, and then without, for the time: its observer then
+/// reads a clock and nothing else.
+Trace trace(Simulation& simulation, ReferenceStep const& reference, StepMeasure const& measure,
+            TraceLimits const& limits);
+
+}  // namespace taut

@@ -1,0 +1,57 @@
+// `taut check`: looks at every frame of a result for what must not be there.
+#include <taut/apps/program/commands.hpp>
+#include <taut/apps/program/simulation.hpp>
+#include <taut/core/io/vtkhdf.hpp>
+#include <taut/core/report/error.hpp>
+
+#include <fmt/core.h>
+
+#include <cmath>
+
+namespace taut {
+
+std::filesystem::path result_file(std::filesystem::path const& result) {
+  if (std::filesystem::is_directory(result)) {
+    auto const file = result / "result.vtkhdf";
+    if (std::filesystem::exists(file)) return file;
+    throw Error("{}: the folder holds no result.vtkhdf; name a folder that `taut run` wrote",
+                result.string());
+  }
+  if (!std::filesystem::exists(result)) {
+    throw Error("{}: there is no such result; name a folder that `taut run` wrote",
+                result.string());
+  }
+  return result;
+}
+
+namespace {
+std::size_t not_finite(std::vector<Point> const& field) {
+  std::size_t count = 0;
+  for (Point const& p : field) {
+    count += !(std::isfinite(p[0]) && std::isfinite(p[1]) && std::isfinite(p[2]));
+  }
+  return count;
+}
+}  // namespace
+
+int check_command(std::filesystem::path const& result) {
+  ResultReader const reader(result_file(result));
+  TetMesh const& mesh = reader.mesh().mesh;
+  std::int64_t bad = 0;
+  for (std::int64_t frame = 0; frame < reader.frames(); ++frame) {
+    auto const x = reader.positions(frame);
+    auto const inverted = inverted_tets(mesh, x);
+    std::size_t lost = not_finite(x);
+    if (reader.has_velocities()) lost += not_finite(reader.velocities(frame));
+    if (inverted.empty() && lost == 0) continue;
+    ++bad;
+    fmt::print("frame {} ({:.6g} s): {} inverted elements{}, {} values not finite\n", frame,
+               reader.times()[frame], inverted.size(),
+               inverted.empty() ? "" : fmt::format(" (first: {})", inverted.front()), lost);
+  }
+  fmt::print("{} frames of {} tets: {}\n", reader.frames(), mesh.tets.size(),
+             bad == 0 ? "clean" : fmt::format("{} with faults", bad));
+  return bad == 0 ? 0 : 1;
+}
+
+}  // namespace taut

@@ -1,0 +1,42 @@
+// The commands of the program, one function each; main.cpp maps the command line onto their
+// options. All return the exit status and throw Error for what the user can mend.
+#pragma once
+
+#include <taut/apps/program/scene.hpp>
+
+#include <filesystem>
+#include <string>
+#include <vector>
+
+namespace taut {
+
+/// Options that every command that reads a scene has.
+struct SceneArguments {
+  std::string scene = "drag";  ///< a built-in name or a file
+  SceneChanges changes;
+};
+
+/// Folders that are searched for scenes named without a path.
+std::vector<std::filesystem::path> scene_folders();
+/// The file of a scene that is named by its path or is built in. Throws Error naming the nearest.
+std::filesystem::path find_scene(std::string const& name);
+
+struct RunOptions {
+  SceneArguments scene;
+  std::filesystem::path out;  ///< empty: results/NAME
+  bool force = false;
+  bool restart = false;
+};
+int run_command(RunOptions const& options);
+
+/// Every frame of a result: inverted elements, values that are not finite. 0 if there are none.
+int check_command(std::filesystem::path const& result);
+
+int scenes_command();
+int methods_command();
+int plan_command(SceneArguments const& scene);
+
+/// The result file of a folder that `run` wrote, or the file itself. Throws Error.
+std::filesystem::path result_file(std::filesystem::path const& result);
+
+}  // namespace taut

@@ -1,0 +1,12 @@
+#include <taut/apps/program/elastic_terms_impl.hpp>
+
+namespace taut {
+
+template void add_elastic_term<NeoHookean, Fp64>(ProgramTerms<Fp64>&, ElasticPart const&,
+                                                 std::string_view);
+template void add_elastic_term<NeoHookean, Mixed>(ProgramTerms<Mixed>&, ElasticPart const&,
+                                                  std::string_view);
+template void add_elastic_term<NeoHookean, Fp32>(ProgramTerms<Fp32>&, ElasticPart const&,
+                                                 std::string_view);
+
+}  // namespace taut

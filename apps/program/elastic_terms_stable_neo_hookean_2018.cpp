@@ -1,0 +1,12 @@
+#include <taut/apps/program/elastic_terms_impl.hpp>
+
+namespace taut {
+
+template void add_elastic_term<StableNeoHookean2018, Fp64>(ProgramTerms<Fp64>&, ElasticPart const&,
+                                                           std::string_view);
+template void add_elastic_term<StableNeoHookean2018, Mixed>(ProgramTerms<Mixed>&,
+                                                            ElasticPart const&, std::string_view);
+template void add_elastic_term<StableNeoHookean2018, Fp32>(ProgramTerms<Fp32>&, ElasticPart const&,
+                                                           std::string_view);
+
+}  // namespace taut

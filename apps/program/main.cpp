@@ -1,0 +1,156 @@
+// The program `taut`: maps the command line onto the commands.
+#include <taut/apps/program/bench.hpp>
+#include <taut/apps/program/chart.hpp>
+#include <taut/apps/program/commands.hpp>
+#include <taut/apps/program/render.hpp>
+#include <taut/core/report/error.hpp>
+
+#include <fmt/core.h>
+#include <CLI/CLI.hpp>
+#include <Kokkos_Core.hpp>
+
+#include <cstdlib>
+#include <functional>
+#include <new>
+
+namespace {
+
+using namespace taut;
+
+void add_scene(CLI::App& command, SceneArguments& arguments) {
+  command.add_option("scene", arguments.scene, "a built-in scene (`taut scenes`) or a TOML file")
+      ->capture_default_str();
+  command.add_option("--set", arguments.changes.overrides,
+                     "changes a key of the scene: --set solver.tolerance=1e-4");
+  command.add_flag("--small", arguments.changes.small, "the small version of the scene");
+}
+
+/// A shorthand for --set KEY=VALUE.
+void add_shorthand(CLI::App& command, SceneArguments& arguments, std::string const& option,
+                   std::string const& key, std::string const& help) {
+  command.add_option_function<std::string>(
+      option,
+      [&arguments, key](std::string const& value) {
+        arguments.changes.overrides.push_back(key + "=" + value);
+      },
+      help + " (" + key + ")");
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  CLI::App app{"taut: implicit simulation of deformable solids"};
+  app.require_subcommand(1);
+  app.set_help_all_flag("--help-all");
+  int threads = 0;
+  std::function<int()> command;
+
+  RunOptions run;
+  auto* run_app = app.add_subcommand("run", "steps a scene and writes its result");
+  add_scene(*run_app, run.scene);
+  add_shorthand(*run_app, run.scene, "--frames", "time.frames", "time steps");
+  add_shorthand(*run_app, run.scene, "--method", "solver.method", "minimiser");
+  add_shorthand(*run_app, run.scene, "--precision", "solver.precision", "fp64, mixed or fp32");
+  run_app->add_option("--out", run.out, "folder of the result (results/NAME)");
+  run_app->add_flag("--force", run.force, "replaces a result that is there");
+  run_app->add_flag("--restart", run.restart, "goes on from the checkpoint in --out");
+  run_app->footer("example: taut run stretch_twist --frames 100 --method newton --out /tmp/twist");
+  run_app->callback([&] { command = [&] { return run_command(run); }; });
+
+  auto* scenes_app = app.add_subcommand("scenes", "lists the built-in scenes");
+  scenes_app->footer("example: taut scenes");
+  scenes_app->callback([&] { command = scenes_command; });
+
+  auto* methods_app = app.add_subcommand("methods", "lists minimisers and their parts");
+  methods_app->footer("example: taut methods");
+  methods_app->callback([&] { command = methods_command; });
+
+  std::string checked;
+  auto* check_app = app.add_subcommand(
+      "check", "looks for inverted elements and values that are not finite in every frame");
+  check_app->add_option("result", checked, "a folder that `taut run` wrote")->required();
+  check_app->footer("example: taut check results/drag");
+  check_app->callback([&] { command = [&] { return check_command(checked); }; });
+
+  SceneArguments plan;
+  auto* plan_app = app.add_subcommand("plan", "says what a scene is composed of, and why");
+  add_scene(*plan_app, plan);
+  plan_app->footer("example: taut plan bimaterial");
+  plan_app->callback([&] { command = [&] { return plan_command(plan); }; });
+
+  ChartOptions chart;
+  bool no_drawing = false;
+  auto* chart_app = app.add_subcommand("chart", "draws error against iterations and seconds");
+  add_scene(*chart_app, chart.scene);
+  chart_app->add_option("--methods", chart.methods, "NAME[:KEY=VALUE...], KEY of [solver]; all")
+      ->delimiter(',');
+  chart_app->add_option("--frame", chart.frames, "time steps to compare")->delimiter(',');
+  chart_app->add_flag("--sweep", chart.sweep, "time to --target against the scene's [sweep]");
+  chart_app->add_option("--target", chart.target, "error that counts as solved")
+      ->capture_default_str();
+  chart_app->add_option("--length", chart.length, "m, what errors are relative to");
+  chart_app->add_option("--iterations", chart.max_iterations, "at most")->capture_default_str();
+  chart_app->add_option("--seconds", chart.max_seconds, "per method, at most")
+      ->capture_default_str();
+  chart_app->add_option("--repetitions", chart.repetitions, "of timed runs")->capture_default_str();
+  chart_app->add_option("--out", chart.out, "folder (charts/NAME)");
+  chart_app->add_flag("--force", chart.force, "replaces a chart that is there");
+  chart_app->add_flag("--no-drawing", no_drawing, "data.csv alone");
+  chart_app->footer("example: taut chart drag --methods dk,lbfgs,newton");
+  chart_app->callback([&] {
+    chart.draw = !no_drawing;
+    command = [&] { return chart_command(chart); };
+  });
+
+  RenderOptions render;
+  std::string rendered, pictures;
+  auto* render_app = app.add_subcommand("render", "pictures and an animation of a result");
+  render_app->add_option("result", rendered, "a folder that `taut run` wrote")->required();
+  render_app->add_option("--frames", render.frames, "numbers or last")->delimiter(',');
+  render_app->add_option("--colour", render.colour, "object, speed or displacement")
+      ->capture_default_str();
+  render_app->add_option("--animation", render.animation, "gif, mp4 or none")
+      ->capture_default_str();
+  render_app->add_option("--out", pictures, "folder (pictures, beside the result)");
+  render_app->add_flag("--force", render.force, "replaces pictures that are there");
+  render_app->footer("example: taut render results/drag --frames 0,75,last");
+  render_app->callback([&] {
+    render.result = rendered;
+    render.out = pictures;
+    command = [&] { return render_command(render); };
+  });
+
+  BenchOptions bench;
+  auto* bench_app = app.add_subcommand("bench", "measures kernels against the machine's limits");
+  auto* elastic_app = bench_app->add_subcommand("elastic", "the elastic sweeps and an iteration");
+  bench_app->require_subcommand(1);
+  elastic_app->add_option("--materials", bench.materials, "models (all)")->delimiter(',');
+  elastic_app->add_option("--precisions", bench.precisions, "fp32, mixed, fp64")->delimiter(',');
+  elastic_app->add_option("--tets", bench.tets, "sizes of the mesh")->delimiter(',');
+  elastic_app->add_option("--seconds", bench.seconds, "spent on each number")
+      ->capture_default_str();
+  elastic_app->add_flag("--json", bench.json, "a JSON list of rows");
+  elastic_app->add_flag("--quick", bench.quick, "a small mesh and hasty numbers");
+  elastic_app->footer("example: taut bench elastic --materials stable_neo_hookean --tets 500000");
+  elastic_app->callback([&] { command = [&] { return bench_command(bench); }; });
+
+  for (CLI::App* sub : app.get_subcommands({})) {
+    sub->add_option("--threads", threads, "threads to use (all)")->check(CLI::Range(1, 4096));
+  }
+  CLI11_PARSE(app, argc, argv);
+
+  Kokkos::InitializationSettings settings;
+  settings.set_disable_warnings(true);
+  if (threads > 0) settings.set_num_threads(threads);
+  Kokkos::ScopeGuard const kokkos(settings);
+  try {
+    return command();
+  } catch (Error const& error) {
+    fmt::print(stderr, "taut: {}\n", error.what());
+  } catch (std::bad_alloc const&) {
+    fmt::print(stderr, "taut: out of memory: lower the resolution of the scene\n");
+  } catch (std::exception const& error) {
+    fmt::print(stderr, "taut: {}\n", error.what());
+  }
+  return 1;
+}

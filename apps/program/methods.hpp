@@ -1,0 +1,65 @@
+// The minimisers of the program, by name. A name stands for a composition of policies; the keys of
+// [solver] change its parts.
+#pragma once
+
+#include <taut/apps/program/any_policies.hpp>
+#include <taut/apps/program/elastic_terms.hpp>
+#include <taut/apps/program/scene_options.hpp>
+#include <taut/core/potential/potential.hpp>
+#include <taut/integrators/newton.hpp>
+#include <taut/integrators/time_stepper.hpp>
+
+#include <memory>
+#include <span>
+#include <string_view>
+
+namespace taut {
+
+template <class P>
+using ProgramPotential = Potential<Inertia<P>, BodyForce<P>, ProgramTerms<P>>;
+
+struct MethodTitle {
+  std::string_view name;         ///< value of solver.method
+  std::string_view title;        ///< for charts
+  std::string_view description;  ///< one line
+};
+
+/// All methods, in the order in which they are listed and drawn.
+std::span<MethodTitle const> method_titles();
+
+/// A minimiser of the program's potential that was chosen by name.
+template <class P>
+class AnyMinimiser {
+public:
+  using Precision = P;
+  using Space = DefaultSpace;
+  using Positions = VectorField<typename P::position, Space>;
+  using Params = SolverOptions;
+
+  /// Throws Error for a combination of options that does not exist.
+  explicit AnyMinimiser(SolverOptions const& options);
+
+  NewtonReport minimise(ProgramPotential<P>& potential, Positions const& x,
+                        Observer<P, Space> const& observer) {
+    last_ = minimiser_->minimise(potential, x, observer);
+    return last_;
+  }
+  /// What the last call returned, with the counts of the linear solver.
+  NewtonReport const& last() const { return last_; }
+
+  struct Interface {
+    virtual ~Interface() = default;
+    virtual NewtonReport minimise(ProgramPotential<P>&, Positions const&,
+                                  Observer<P, Space> const&) = 0;
+  };
+
+private:
+  std::unique_ptr<Interface> minimiser_;
+  NewtonReport last_;
+};
+
+extern template class AnyMinimiser<Fp64>;
+extern template class AnyMinimiser<Mixed>;
+extern template class AnyMinimiser<Fp32>;
+
+}  // namespace taut

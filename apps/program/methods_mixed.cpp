@@ -1,0 +1,7 @@
+#include <taut/apps/program/methods_impl.hpp>
+
+namespace taut {
+
+template class AnyMinimiser<Mixed>;
+
+}  // namespace taut

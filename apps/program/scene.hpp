@@ -1,0 +1,146 @@
+// A scene: what is simulated, read from a TOML file (docs/scenes.md describes the keys) into plain
+// data with every default filled in, every name resolved and every number in range.
+#pragma once
+
+#include <taut/apps/program/scene_motion.hpp>
+#include <taut/apps/program/scene_options.hpp>
+#include <taut/apps/program/scene_select.hpp>
+#include <taut/core/fem/shapes.hpp>
+
+#include <filesystem>
+#include <optional>
+#include <string>
+#include <variant>
+#include <vector>
+
+namespace taut {
+
+enum class TimeScheme { implicit_euler, bdf2, quasi_static };
+
+struct MaterialParameters {
+  std::string model;  ///< a name of `material_models()`
+  double young;       ///< Pa
+  double poisson;
+  double density;  ///< kg/m^3
+};
+
+struct MaterialModel {
+  std::string_view name;
+  bool allows_inversion;  ///< defined for J <= 0
+};
+std::span<MaterialModel const> material_models();
+
+/// v(x) = linear + w a x (x - centre); with a twist length L the rate w varies along the axis as
+/// w sin(pi s / 2L), s = a . (x - centre).
+struct InitialVelocity {
+  Point linear{};                      ///< m/s
+  Point axis{0, 1, 0};                 ///< unit vector a
+  Point centre{};                      ///< m
+  double angular_velocity = 0;         ///< rad/s
+  std::optional<double> twist_length;  ///< m
+};
+
+/// Where an object's vertices are at time 0, other than at rest.
+struct StartFlat {
+  Point normal{0, 1, 0};       ///< unit vector
+  std::optional<Point> point;  ///< m, on the plane; the centre of the object's box if not given
+};
+struct StartRandom {
+  int seed = 1;
+  std::optional<std::array<Point, 2>> box;  ///< m; the object's bounding box if not given
+};
+using Start = std::variant<std::monostate, StartFlat, StartRandom>;
+
+struct SceneRegion {
+  std::string where;  ///< "drag.toml:20: object.body.region.0", for messages
+  Selection selection;
+  MaterialParameters material;
+};
+
+struct ProceduralShape {
+  Shape shape;
+  int resolution;
+};
+
+struct SceneObject {
+  std::string where;
+  std::string name;
+  std::variant<ProceduralShape, std::filesystem::path> geometry;
+  double scale = 1;    ///< the mesh is scaled, then rotated about the origin, then translated
+  RigidMap placement;  ///< rotation and translation
+  InitialVelocity velocity;
+  MaterialParameters material;
+  std::vector<SceneRegion> regions;  ///< later ones win
+  Start start;
+};
+
+/// Prescribed vertices. They follow `motion` from their rest position until the time of release.
+struct ScenePin {
+  std::string where;
+  std::string name;
+  std::vector<std::size_t> objects;
+  Selection selection;
+  RigidMotion motion;
+  Window window;
+};
+
+struct SceneForce {
+  enum class Kind {
+    per_vertex,   ///< N at every selected vertex
+    total,        ///< N, spread over the selected boundary faces by area
+    acceleration  ///< m/s^2
+  };
+  std::string where;
+  std::vector<std::size_t> objects;
+  Selection selection;
+  Kind kind;
+  Point value;
+  Window window;
+};
+
+struct OutputOptions {
+  int every = 1;      ///< frames between written frames
+  bool obj = false;   ///< also a surface per written frame
+  bool check = true;  ///< look for inverted elements and non-finite values
+};
+
+/// A family of scenes: the override `key`=value for each of the values.
+struct Sweep {
+  std::string key;
+  std::vector<double> values;
+};
+
+struct Scene {
+  std::filesystem::path file;
+  std::string name;
+  std::string description;
+  TimeScheme scheme = TimeScheme::implicit_euler;
+  double step = 0;  ///< s
+  int frames = 0;   ///< time steps
+  Point gravity{};  ///< m/s^2
+  std::vector<SceneObject> objects;
+  std::vector<ScenePin> pins;
+  std::vector<SceneForce> forces;
+  SolverOptions solver;
+  OutputOptions output;
+  std::optional<Sweep> sweep;
+  std::vector<std::string> warnings;
+};
+
+struct SceneChanges {
+  bool small = false;                  ///< lay the [small] table over the scene
+  std::vector<std::string> overrides;  ///< "key.path=value", in order, after [small]
+};
+
+/// Reads and checks a scene, its [small] version and every member of its sweep. Mesh and mask files
+/// must exist; what is in them is for build_geometry. Throws Error.
+Scene load_scene(std::filesystem::path const& file, SceneChanges const& changes = {});
+
+/// Name and description of a scene without looking for its data.
+struct SceneTitle {
+  std::string name;
+  std::string description;
+};
+SceneTitle read_scene_title(std::filesystem::path const& file);
+
+}  // namespace taut

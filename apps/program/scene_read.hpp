@@ -1,0 +1,26 @@
+// The parts of a scene, from checked values to the structs of scene.hpp.
+#pragma once
+
+#include <taut/apps/program/scene.hpp>
+#include <taut/apps/program/scene_value.hpp>
+
+namespace taut {
+
+inline constexpr double unbounded = std::numeric_limits<double>::infinity();
+inline constexpr Range any_number{-unbounded, unbounded};
+inline constexpr Range length_range{.min = 1e-9, .max = 1e9, .unit = "m"};
+inline constexpr Range time_range{.min = 0, .max = 1e9, .unit = "s"};
+
+double radians(double degrees);
+
+/// A file named in a scene: relative to the scene's folder, then to TAUT_DATA_DIR. Throws Error
+/// saying where it was looked for.
+std::filesystem::path find_data(SceneValue const& value, std::string_view path,
+                                std::filesystem::path const& scene_file);
+
+Selection read_selection(Section const& parent, std::filesystem::path const& scene_file);
+SceneObject read_object(Section const& section, Scene& scene);
+ScenePin read_pin(Section const& section, Scene const& scene);
+SceneForce read_force(Section const& section, Scene const& scene);
+
+}  // namespace taut

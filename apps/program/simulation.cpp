@@ -1,0 +1,285 @@
+#include <taut/apps/program/methods.hpp>
+#include <taut/apps/program/simulation.hpp>
+#include <taut/core/fem/ordering.hpp>
+#include <taut/core/fem/rest_shape.hpp>
+
+#include <cmath>
+
+namespace taut {
+
+std::vector<std::int32_t> inverted_tets(TetMesh const& rest, std::vector<Point> const& x) {
+  std::vector<std::int32_t> inverted;
+  for (std::size_t t = 0; t < rest.tets.size(); ++t) {
+    Mat3<double> D;
+    Tet const& tet = rest.tets[t];
+    for (int a = 0; a < 3; ++a)
+      for (int c = 0; c < 3; ++c) D(c, a) = x[tet[a + 1]][c] - x[tet[0]][c];
+    // Rest tets are positively oriented. NaN counts as inverted.
+    if (!(determinant(D) > 0)) inverted.push_back(static_cast<std::int32_t>(t));
+  }
+  return inverted;
+}
+
+namespace {
+
+std::string first_few(std::vector<std::int32_t> const& tets) {
+  std::string text;
+  for (std::size_t k = 0; k < tets.size() && k < 5; ++k) {
+    text += fmt::format("{}{}", k == 0 ? "" : ", ", tets[k]);
+  }
+  return tets.size() > 5 ? text + ", ..." : text;
+}
+
+template <class P>
+class SimulationOf final : public Simulation {
+public:
+  using Position = typename P::position;
+  using Positions = VectorField<Position, DefaultSpace>;
+  using Vectors = VectorField<typename P::real, DefaultSpace>;
+
+  SimulationOf(Scene const& scene, SceneGeometry const& geometry)
+      : scene_(scene),
+        geometry_(geometry),
+        order_(locality_order(geometry.mesh, geometry.material_of_tet)),
+        lumped_(lumped_mass(geometry.mesh, density_per_tet(geometry))),
+        potential_(make_potential()),
+        state_(size()),
+        forces_("forces", size()),
+        fixed_(Kokkos::create_mirror_view(potential_.unknowns().fixed)),
+        prescribed_(Kokkos::create_mirror_view(potential_.unknowns().prescribed)),
+        euler_(scene.solver),
+        bdf2_(scene.solver),
+        static_(scene.solver) {
+    write(state_.x, geometry.start);
+    write(state_.v, geometry.velocity);
+    refuse_forbidden_inversion();
+  }
+
+  NewtonReport step(IterationObserver const& observer) override {
+    double const h = scene_.step;
+    prescribe(state_.time + h, h);
+    Observer<P, DefaultSpace> inner;
+    if (observer) {
+      inner = [&](Iteration<P, DefaultSpace> const& i) {
+        observer({i.index, i.energy_change_so_far, i.error_estimate, [&] { return read(i.x); }});
+      };
+    }
+    State<P> const before = copy(state_);
+    NewtonReport const report = advance(h, inner);
+    if (report.stop == Stop::non_finite) {
+      auto const inverted = inverted_tets(geometry_.mesh, read(state_.x));
+      state_ = before;
+      throw Error(
+          "step {} at {:.6g} s: the energy is not a number any more ({}); use a smaller time.step, "
+          "or "
+          "a material that tolerates inversion",
+          state_.steps + 1, state_.time,
+          inverted.empty()
+              ? "no element is inverted"
+              : fmt::format("{} inverted elements: {}", inverted.size(), first_few(inverted)));
+    }
+    return report;
+  }
+
+  double time() const override { return state_.time; }
+  int steps() const override { return state_.steps; }
+  std::vector<Point> positions() const override { return read(state_.x); }
+  std::vector<Point> velocities() const override { return read(state_.v); }
+
+  void save(Checkpoint& checkpoint) const override {
+    checkpoint.set("time", std::vector<double>{state_.time});
+    checkpoint.set("steps", std::vector<std::int32_t>{state_.steps});
+    for (auto const& [name, field] : fields()) checkpoint.set(name, flat(field));
+  }
+  void restore(Checkpoint const& checkpoint) override {
+    state_.time = checkpoint.number<double>("time");
+    state_.steps = checkpoint.number<std::int32_t>("steps");
+    for (auto const& [name, field] : fields()) {
+      auto const& numbers = checkpoint.get<Position>(name);
+      if (numbers.size() != 3 * std::size_t(size())) {
+        throw Error(
+            "the checkpoint holds {} numbers as {}, the scene needs {}; start the run again",
+            numbers.size(), name, 3 * size());
+      }
+      auto const host = Kokkos::create_mirror_view(field);
+      for (int i = 0; i < size(); ++i)
+        for (int c = 0; c < 3; ++c) host(i, c) = numbers[3 * i + c];
+      Kokkos::deep_copy(field, host);
+    }
+  }
+
+private:
+  int size() const { return static_cast<int>(geometry_.mesh.points.size()); }
+
+  static std::vector<double> density_per_tet(SceneGeometry const& geometry) {
+    std::vector<double> density;
+    for (std::int32_t m : geometry.material_of_tet) {
+      density.push_back(geometry.materials[m].density);
+    }
+    return density;
+  }
+
+  ProgramPotential<P> make_potential() const {
+    std::vector<double> mass;
+    for (std::int32_t v : order_.vertices) mass.push_back(lumped_[v]);
+    Unknowns<P> const unknowns(mass, mean_edge_length(geometry_.mesh));
+    ProgramTerms<P> terms;
+    // One term per model; the tets of a material stay together in the solver's order.
+    std::vector<std::string> models;
+    for (MaterialParameters const& m : geometry_.materials) {
+      if (std::find(models.begin(), models.end(), m.model) == models.end())
+        models.push_back(m.model);
+    }
+    for (std::string const& model : models) {
+      ElasticPart const part = part_of(model);
+      ElasticModels::with(model, [&]<class Model>() {
+        add_elastic_term<Model, P>(terms, part, scene_.solver.text("curvature"));
+        return true;
+      });
+    }
+    Point const& g = scene_.gravity;
+    return ProgramPotential<P>(unknowns, Inertia<P>(unknowns),
+                               BodyForce<P>(unknowns, {g[0], g[1], g[2]}), terms);
+  }
+
+  ElasticPart part_of(std::string const& model) const {
+    ElasticPart part;
+    for (std::int32_t v : order_.vertices) part.rest.points.push_back(geometry_.mesh.points[v]);
+    for (MaterialParameters const& m : geometry_.materials) {
+      part.materials.push_back(lame_parameters(m.young, m.poisson));
+    }
+    for (std::int32_t t : order_.tets) {
+      int const m = geometry_.material_of_tet[t];
+      if (geometry_.materials[m].model != model) continue;
+      Tet tet;
+      for (int a = 0; a < 4; ++a) tet[a] = order_.new_vertex[geometry_.mesh.tets[t][a]];
+      part.rest.tets.push_back(tet);
+      part.material_of_tet.push_back(m);
+    }
+    return part;
+  }
+
+  void refuse_forbidden_inversion() const {
+    for (std::int32_t t : inverted_tets(geometry_.mesh, geometry_.start)) {
+      std::string const& model = geometry_.materials[geometry_.material_of_tet[t]].model;
+      bool const allowed =
+          ElasticModels::with(model, []<class Model>() { return Model::allows_inversion; });
+      if (!allowed) {
+        throw Error(
+            "{}: element {} starts inverted or flat, which {} forbids: start it at rest or choose "
+            "a "
+            "model that tolerates inversion",
+            scene_.file.string(), t, model);
+      }
+    }
+  }
+
+  /// Pins and forces of the step that ends at time t.
+  void prescribe(double t, double h) {
+    Kokkos::deep_copy(fixed_, std::uint8_t(0));
+    for (Pin const& pin : geometry_.pins) {
+      if (!pin.window.covers_step(t, h)) continue;
+      RigidMap const map = pin.motion.at(t);
+      for (std::int32_t v : pin.vertices) {
+        int const i = order_.new_vertex[v];
+        Point const to = map(geometry_.mesh.points[v]);
+        fixed_(i) = 1;
+        for (int c = 0; c < 3; ++c) prescribed_(i, c) = static_cast<Position>(to[c]);
+      }
+    }
+    Kokkos::deep_copy(potential_.unknowns().fixed, fixed_);
+    Kokkos::deep_copy(potential_.unknowns().prescribed, prescribed_);
+
+    bool any = false;
+    auto const host = Kokkos::create_mirror_view(forces_);
+    Kokkos::deep_copy(host, 0);
+    for (Force const& force : geometry_.forces) {
+      if (!force.window.covers_step(t, h)) continue;
+      any = true;
+      for (std::size_t k = 0; k < force.vertices.size(); ++k) {
+        std::int32_t const v = force.vertices[k];
+        for (int c = 0; c < 3; ++c) {
+          double f = lumped_[v] * force.acceleration[c];
+          if (!force.force.empty()) f += force.force[k][c];
+          host(order_.new_vertex[v], c) += static_cast<typename P::real>(f);
+        }
+      }
+    }
+    Kokkos::deep_copy(forces_, host);
+    potential_.template term<BodyForce<P>>().set_forces(any ? forces_ : Vectors());
+  }
+
+  NewtonReport advance(double h, Observer<P, DefaultSpace> const& observer) {
+    auto const run = [&](auto& stepper) {
+      stepper.step(potential_, state_, h, observer);
+      return stepper.minimiser().last();
+    };
+    switch (scene_.scheme) {
+      case TimeScheme::bdf2:
+        return run(bdf2_);
+      case TimeScheme::quasi_static:
+        return run(static_);
+      default:
+        return run(euler_);
+    }
+  }
+
+  template <class Field>
+  void write(Field const& field, std::vector<Point> const& from) const {
+    auto const host = Kokkos::create_mirror_view(field);
+    for (int i = 0; i < size(); ++i)
+      for (int c = 0; c < 3; ++c) host(i, c) = static_cast<Position>(from[order_.vertices[i]][c]);
+    Kokkos::deep_copy(field, host);
+  }
+  std::vector<Point> read(Positions const& field) const {
+    auto const host = Kokkos::create_mirror_view_and_copy(Kokkos::HostSpace(), field);
+    std::vector<Point> to(size());
+    for (int i = 0; i < size(); ++i)
+      for (int c = 0; c < 3; ++c) to[order_.vertices[i]][c] = host(i, c);
+    return to;
+  }
+  std::vector<Position> flat(Positions const& field) const {
+    auto const host = Kokkos::create_mirror_view_and_copy(Kokkos::HostSpace(), field);
+    std::vector<Position> to;
+    for (int i = 0; i < size(); ++i)
+      for (int c = 0; c < 3; ++c) to.push_back(host(i, c));
+    return to;
+  }
+  std::vector<std::pair<std::string, Positions>> fields() const {
+    return {{"x", state_.x}, {"v", state_.v}, {"x_last", state_.x_last}, {"v_last", state_.v_last}};
+  }
+  static State<P> copy(State<P> const& from) {
+    State<P> to(from.size());
+    Kokkos::deep_copy(to.x, from.x);
+    Kokkos::deep_copy(to.v, from.v);
+    Kokkos::deep_copy(to.x_last, from.x_last);
+    Kokkos::deep_copy(to.v_last, from.v_last);
+    to.time = from.time;
+    to.steps = from.steps;
+    return to;
+  }
+
+  Scene scene_;
+  SceneGeometry geometry_;
+  Ordering order_;
+  std::vector<double> lumped_;  ///< in the mesh's order
+  ProgramPotential<P> potential_;
+  State<P> state_;
+  Vectors forces_;
+  typename FixedMask<DefaultSpace>::HostMirror fixed_;
+  typename Positions::HostMirror prescribed_;
+  ImplicitEuler<AnyMinimiser<P>> euler_;
+  Bdf2<AnyMinimiser<P>> bdf2_;
+  QuasiStatic<AnyMinimiser<P>> static_;
+};
+
+}  // namespace
+
+std::unique_ptr<Simulation> Simulation::create(Scene const& scene, SceneGeometry const& geometry) {
+  std::string const& precision = scene.solver.text("precision");
+  if (precision == "fp32") return std::make_unique<SimulationOf<Fp32>>(scene, geometry);
+  if (precision == "mixed") return std::make_unique<SimulationOf<Mixed>>(scene, geometry);
+  return std::make_unique<SimulationOf<Fp64>>(scene, geometry);
+}
+
+}  // namespace taut

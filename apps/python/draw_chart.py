@@ -1,0 +1,224 @@
+"""Draws the data of `taut chart`: draw_chart.py DATA.csv OUT writes OUT.svg and OUT.png.
+
+A comparison has a row of panels per frame and measure, over iterations and over seconds; a sweep
+has iterations and seconds over the swept value. Every curve is labelled at its end. A method that
+did not come below the target is a failure: it ends in a cross with the reason.
+"""
+
+import csv
+import math
+import re
+import sys
+
+import matplotlib
+
+matplotlib.use("Agg")
+import matplotlib.pyplot as plt
+from matplotlib.ticker import LogLocator, NullFormatter
+
+# Okabe and Ito's colours, told apart by all kinds of colour vision; then again, dashed.
+COLOURS = ["#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#000000"]
+DASHES = ["solid", (0, (5, 1.5)), (0, (1, 1.2)), (0, (5, 1.5, 1, 1.5))]
+INK, PALE = "#333333", "#999999"
+
+plt.rcParams.update({
+    "font.family": "DejaVu Sans", "font.size": 9, "axes.edgecolor": PALE, "axes.linewidth": 0.8,
+    "axes.spines.top": False, "axes.spines.right": False, "axes.labelcolor": INK,
+    "xtick.color": INK, "ytick.color": INK, "text.color": INK, "svg.fonttype": "none",
+    "axes.grid": True, "grid.color": "#e6e6e6", "grid.linewidth": 0.6,
+})
+
+
+def read(path):
+    """The lines "# name = value" as a dictionary, and the rows with numbers where there are."""
+    facts, table = {}, []
+    with open(path, encoding="utf-8") as file:
+        for line in file:
+            if line.startswith("# "):
+                name, _, value = line[2:].rstrip("\n").partition(" = ")
+                facts[name] = value
+            else:
+                table.append(line)
+    rows = list(csv.DictReader(table))
+    for row in rows:
+        for name, value in row.items():
+            if name not in ("method", "ended"):
+                row[name] = float(value) if value else math.nan
+    return facts, rows
+
+
+def methods_of(rows):
+    """Each method with its style, in the order of the data."""
+    names = list(dict.fromkeys(row["method"] for row in rows))
+    return {name: {"color": COLOURS[i % len(COLOURS)],
+                   "linestyle": DASHES[i // len(COLOURS) % len(DASHES)]}
+            for i, name in enumerate(names)}
+
+
+def positive(xs, ys):
+    """The points that a logarithmic chart can show."""
+    return [(x, y) for x, y in zip(xs, ys) if x > 0 and y > 0 and math.isfinite(x + y)]
+
+
+def label_ends(axes, ends):
+    """Writes (x, y, text, colour) at the ends of the curves: on the spot where a curve ends early,
+    else beside the axes at the height of y, moved apart where they would overlap, with a thin line
+    from the end of the curve."""
+    height = axes.get_window_extent().height
+    step = 1.1 * plt.rcParams["font.size"] * axes.figure.dpi / 72 / height
+    placed = []
+    for x, y, text, colour in sorted(ends, key=lambda end: end[1]):
+        at = axes.transAxes.inverted().transform(axes.transData.transform((x, y)))
+        if at[0] < 0.7:
+            axes.annotate(text, xy=(x, y), xytext=(7, 0), textcoords="offset points", color=colour,
+                          va="center", fontsize="small", annotation_clip=False)
+        else:
+            placed.append([at[1], at, text, colour])
+    for _ in range(500):  # neighbours push each other apart
+        moved = False
+        for low, high in zip(placed, placed[1:]):
+            overlap = step - (high[0] - low[0])
+            if overlap > 1e-6:
+                low[0] -= overlap / 2
+                high[0] += overlap / 2
+                moved = True
+        if placed and placed[0][0] < 0:
+            placed[0][0], moved = 0.0, True
+        if not moved:
+            break
+    for y, at, text, colour in placed:
+        axes.annotate(text, xy=at, xytext=(1.04, y), xycoords="axes fraction", color=colour,
+                      va="center", fontsize="small", annotation_clip=False,
+                      arrowprops={"arrowstyle": "-", "color": colour, "lw": 0.5, "alpha": 0.6,
+                                  "shrinkA": 1, "shrinkB": 2})
+
+
+def log_axes(axes):
+    axes.set_xscale("log")
+    axes.set_yscale("log")
+    for axis in (axes.xaxis, axes.yaxis):
+        axis.set_major_locator(LogLocator(numticks=9))
+        axis.set_minor_formatter(NullFormatter())
+    axes.tick_params(which="minor", length=2, color=PALE)
+    axes.tick_params(which="major", length=4, color=PALE)
+
+
+def compare_panel(axes, rows, styles, abscissa, measure, target):
+    ends = []
+    for method, style in styles.items():
+        mine = [row for row in rows if row["method"] == method]
+        points = positive([row[abscissa] for row in mine], [row[measure] for row in mine])
+        if not points:
+            continue
+        axes.plot(*zip(*points), lw=1.4, solid_capstyle="round", **style)
+        failed = not mine[-1]["position_error"] <= target
+        text = method
+        if failed:
+            axes.plot(*points[-1], marker="X", ms=8, color=style["color"], mec="white", mew=0.8,
+                      zorder=5)
+            text += f" ({mine[-1]['ended']})"
+        ends.append((*points[-1], text, style["color"]))
+    return ends
+
+
+def draw_comparison(facts, rows):
+    frames = sorted({row["frame"] for row in rows})
+    styles = methods_of(rows)
+    target = float(facts["target"])
+    measures = [("position_error", "error of position"), ("energy_gap", "energy above the solution")]
+    figure, grid = plt.subplots(2 * len(frames), 2, figsize=(12, 8.2 * len(frames)), squeeze=False)
+    labels = []
+    for i, frame in enumerate(frames):
+        mine = [row for row in rows if row["frame"] == frame]
+        scale = 1e3 * float(facts[f"frame {frame:.0f} length_m"])
+        resolved = float(facts[f"frame {frame:.0f} reference_last_move"])
+        for j, (measure, title) in enumerate(measures):
+            for k, abscissa in enumerate(("iteration", "seconds")):
+                axes = grid[2 * i + j][k]
+                log_axes(axes)
+                labels.append((axes, compare_panel(axes, mine, styles, abscissa, measure, target)))
+                if measure == "position_error":
+                    axes.axhline(target, color=PALE, lw=0.8, ls=(0, (4, 3)), zorder=1)
+                    axes.annotate(f"{target:.3g}", (1, target), xycoords=("axes fraction", "data"),
+                                  ha="right", va="bottom", fontsize="small", color=PALE)
+                    limits = axes.get_ylim()
+                    axes.axhspan(limits[0] * 1e-9, resolved, color="#f0f0f0", zorder=0, lw=0)
+                    axes.set_ylim(limits)
+                axes.set_xlabel("iterations" if abscissa == "iteration" else "seconds")
+            unit = f"1 = {scale:.3g} mm" if measure == "position_error" else "1 = at the step's start"
+            grid[2 * i + j][0].set_ylabel(f"{title}   ({unit})")
+        missing = [f"{row['method']}: {row['ended']}" for row in mine if row["iteration"] == 0]
+        subtitle = f"step {frame:.0f}"
+        if missing:
+            subtitle += ";  no iteration at all: " + ", ".join(missing)
+        grid[2 * i][0].set_title(subtitle, loc="left", fontsize="medium", color="#666666")
+    return figure, labels
+
+
+def draw_sweep(facts, rows):
+    styles = methods_of(rows)
+    target = float(facts["target"])
+    figure, grid = plt.subplots(1, 2, figsize=(12, 4.8))
+    labels = []
+    for axes, measure in zip(grid, ("iterations", "seconds")):
+        log_axes(axes)
+        ends, failures = [], []
+        for method, style in styles.items():
+            mine = [row for row in rows if row["method"] == method]
+            points = positive([row["value"] for row in mine], [row[measure] for row in mine])
+            if points:
+                axes.plot(*zip(*points), marker="o", ms=4, lw=1.4, **style)
+                ends.append((*points[-1], method, style["color"]))
+            failures += [(row["value"], row["ended"], style["color"], method) for row in mine
+                         if not row[measure] > 0]
+        draw_failures(axes, failures)
+        axes.set_xlabel(facts["key"])
+        axes.set_ylabel(f"{measure} to an error of {target:.3g}")
+        labels.append((axes, ends))
+    return figure, labels
+
+
+def draw_failures(axes, failures):
+    """Crosses in a band above all curves, one line per method."""
+    if not failures:
+        return
+    low, high = axes.get_ylim()
+    methods = list(dict.fromkeys(failure[3] for failure in failures))
+    step = (high / low) ** 0.07
+    for value, reason, colour, method in failures:
+        y = high * step ** (methods.index(method) + 0.7)
+        axes.plot(value, y, marker="X", ms=8, color=colour, mec="white", mew=0.8, zorder=5)
+    for i, method in enumerate(methods):
+        mine = [failure for failure in failures if failure[3] == method]
+        reasons = "/".join(dict.fromkeys(failure[1] for failure in mine))
+        first = min(failure[0] for failure in mine)
+        axes.annotate(f"{method}: {reasons}", (first, high * step ** (i + 0.7)), xytext=(-7, 0),
+                      textcoords="offset points", ha="right", va="center", fontsize="small",
+                      color=mine[0][2])
+    axes.axhspan(high, high * step ** (len(methods) + 0.4), color="#f5f5f5", zorder=0, lw=0)
+    axes.set_ylim(low, high * step ** (len(methods) + 0.4))
+
+
+def main():
+    data, out = sys.argv[1:3]
+    facts, rows = read(data)
+    draw = draw_sweep if facts["kind"] == "sweep" else draw_comparison
+    figure, labels = draw(facts, rows)
+    inches = figure.get_size_inches()[1]
+    figure.subplots_adjust(left=0.065, right=0.86, wspace=0.5, hspace=0.24, bottom=0.55 / inches,
+                           top=1 - 0.95 / inches)
+    facts = {name: re.sub(r"e\+0?", "e", value) for name, value in facts.items()}
+    figure.text(0.02, 1 - 0.12 / inches, facts["scene"], va="top", fontsize=13, fontweight="bold")
+    figure.text(0.02, 1 - 0.40 / inches, f"{int(facts['tets']):,} tets, {facts['materials']}, "
+                f"{facts['integrator']} with {facts['step_s']} s, {facts['threads']} thread"
+                f"{'' if facts['threads'] == '1' else 's'}; errors against projected Newton in fp64",
+                va="top", color="#666666")
+    figure.canvas.draw()  # fixes the limits that labels are placed by
+    for axes, ends in labels:
+        label_ends(axes, ends)
+    figure.savefig(out + ".svg")
+    figure.savefig(out + ".png", dpi=160)
+
+
+if __name__ == "__main__":
+    main()

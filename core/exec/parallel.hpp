@@ -1,0 +1,176 @@
+// Loops and reductions over Kokkos, with names that profilers see.
+//
+// Sums are deterministic: the terms are added in runs of fixed length, each by one thread in index
+// order, and the run sums are added the same way until few are left. The shape of the sum depends
+// on the number of terms alone, never on the number of threads, so results are bitwise repeatable.
+// `FreeSum` is the opt-out: it leaves the order to Kokkos.
+#pragma once
+
+#include <taut/core/exec/space.hpp>
+
+#include <array>
+#include <type_traits>
+
+namespace taut {
+
+/// Calls `functor(i)` for i in [0, n).
+template <class S, class Functor>
+void for_each(char const* name, int n, Functor const& functor) {
+  Kokkos::parallel_for(name, Kokkos::RangePolicy<typename S::execution>(0, n), functor);
+}
+
+/// Calls `functor(i, largest)` for i in [0, n), where `functor` raises `largest`; returns it, or
+/// `floor` if n = 0. A maximum is exact, so its order is free.
+template <class S, class T, class Functor>
+T maximum(char const* name, int n, T floor, Functor const& functor) {
+  T result = floor;
+  if (n > 0) {
+    Kokkos::parallel_reduce(name, Kokkos::RangePolicy<typename S::execution>(0, n), functor,
+                            Kokkos::Max<T>(result));
+  }
+  return Kokkos::max(result, floor);
+}
+
+/// As `maximum`, for the smallest.
+template <class S, class T, class Functor>
+T minimum(char const* name, int n, T ceiling, Functor const& functor) {
+  T result = ceiling;
+  if (n > 0) {
+    Kokkos::parallel_reduce(name, Kokkos::RangePolicy<typename S::execution>(0, n), functor,
+                            Kokkos::Min<T>(result));
+  }
+  return Kokkos::min(result, ceiling);
+}
+
+/// K sums that are accumulated side by side.
+template <class T, int K>
+struct Sums {
+  T value[K] = {};
+  KOKKOS_FORCEINLINE_FUNCTION T& operator[](int k) { return value[k]; }
+  KOKKOS_FORCEINLINE_FUNCTION T const& operator[](int k) const { return value[k]; }
+  KOKKOS_FORCEINLINE_FUNCTION void operator+=(Sums const& other) {
+    for (int k = 0; k < K; ++k) value[k] += other.value[k];
+  }
+};
+
+namespace kernels {
+
+/// Sums run `r` of a loop body.
+template <class View, class Functor, class T, int K>
+struct SumRun {
+  Functor functor;
+  View partial;
+  int n, length;
+  KOKKOS_FUNCTION void operator()(int r) const {
+    Sums<T, K> sums;
+    int const last = Kokkos::min(n, (r + 1) * length);
+    for (int i = r * length; i < last; ++i) functor(i, sums);
+    for (int k = 0; k < K; ++k) partial(K * r + k) = sums[k];
+  }
+};
+
+/// Sums runs of earlier partial sums.
+template <class View, class T, int K>
+struct SumPartials {
+  View from;
+  KOKKOS_FUNCTION void operator()(int i, Sums<T, K>& sums) const {
+    for (int k = 0; k < K; ++k) sums[k] += from(K * i + k);
+  }
+};
+
+}  // namespace kernels
+
+/// Deterministic sums of up to `max_sums` values side by side over loops of up to `max_terms`
+/// iterations. Owns its scratch memory, so that a sum allocates nothing.
+template <class S, class T = double>
+class Reducer {
+public:
+  /// Length of a run: long on the host, where a thread does many; short on a device, where there
+  /// are thousands of threads to feed.
+  static constexpr int run_length = S::on_host ? 512 : 32;
+
+  Reducer() = default;
+  explicit Reducer(int max_terms, int max_sums = 8)
+      : first_("reducer_first", std::size_t(runs(max_terms)) * max_sums),
+        second_("reducer_second", std::size_t(runs(runs(max_terms))) * max_sums),
+        host_("reducer_host", std::size_t(run_length) * max_sums) {}
+
+  /// For kernels that leave `count` partial sums by themselves.
+  static Reducer of_partials(int count, int max_sums = 1) {
+    return Reducer(count * run_length, max_sums);
+  }
+
+  /// `functor(i, Sums<T, K>& sums)` adds the terms of iteration i.
+  template <int K, class Functor>
+  Sums<T, K> sum(char const* name, int n, Functor const& functor) const {
+    if (n == 0) return {};
+    int count = runs(n);
+    for_each<S>(name, count, kernels::SumRun<View, Functor, T, K>{functor, first_, n, run_length});
+    return finish<K>(name, count);
+  }
+
+  /// The sum of `count` partial sums that a kernel has left in `partials()`, at K * i + k.
+  template <int K>
+  Sums<T, K> finish(char const* name, int count) const {
+    View from = first_, to = second_;
+    while (count > run_length) {
+      int const next = runs(count);
+      using Functor = kernels::SumPartials<View, T, K>;
+      for_each<S>(name, next,
+                  kernels::SumRun<View, Functor, T, K>{Functor{from}, to, count, run_length});
+      std::swap(from, to);
+      count = next;
+    }
+    auto const range = Kokkos::make_pair(std::size_t(0), std::size_t(K) * count);
+    Kokkos::deep_copy(typename S::execution(), Kokkos::subview(host_, range),
+                      Kokkos::subview(from, range));
+    Kokkos::fence("taut: reduction");
+    Sums<T, K> total;
+    for (int i = 0; i < count; ++i)
+      for (int k = 0; k < K; ++k) total[k] += host_(K * i + k);
+    return total;
+  }
+
+  /// Where a kernel that sums by itself (one partial per block of its own) leaves its partial sums.
+  Kokkos::View<T*, typename S::memory> partials() const { return first_; }
+
+private:
+  using View = Kokkos::View<T*, typename S::memory>;
+  static int runs(int n) { return (n + run_length - 1) / run_length; }
+
+  View first_, second_;
+  Kokkos::View<T*, Kokkos::HostSpace> host_;
+};
+
+/// The opt-out: sums in the order that Kokkos chooses; bitwise repeatable for one thread only.
+template <class S, class T = double>
+class FreeReducer {
+public:
+  FreeReducer() = default;
+  explicit FreeReducer(int, int = 8) {}
+
+  template <int K, class Functor>
+  Sums<T, K> sum(char const* name, int n, Functor const& functor) const;
+};
+
+namespace kernels {
+template <class Functor, class T, int K>
+struct FreeSum {
+  using value_type = Sums<T, K>;
+  Functor functor;
+  KOKKOS_FUNCTION void operator()(int i, value_type& sums) const { functor(i, sums); }
+  KOKKOS_FUNCTION void join(value_type& to, value_type const& from) const { to += from; }
+  KOKKOS_FUNCTION void init(value_type& sums) const { sums = {}; }
+};
+}  // namespace kernels
+
+template <class S, class T>
+template <int K, class Functor>
+Sums<T, K> FreeReducer<S, T>::sum(char const* name, int n, Functor const& functor) const {
+  Sums<T, K> total;
+  Kokkos::parallel_reduce(name, Kokkos::RangePolicy<typename S::execution>(0, n),
+                          kernels::FreeSum<Functor, T, K>{functor}, total);
+  return total;
+}
+
+}  // namespace taut

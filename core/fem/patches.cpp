@@ -1,0 +1,112 @@
+#include <taut/core/fem/patches.hpp>
+
+#include <algorithm>
+
+namespace taut {
+
+namespace {
+
+// Compressed lists: list i of `lists` takes each j with key[j] == i, ascending in j.
+void compress(std::vector<int> const& key, int lists, std::vector<int>& begin,
+              std::vector<int>& entries) {
+  begin.assign(lists + 1, 0);
+  for (int k : key) ++begin[k + 1];
+  for (int i = 0; i < lists; ++i) begin[i + 1] += begin[i];
+  entries.resize(key.size());
+  std::vector<int> next(begin.begin(), begin.end() - 1);
+  for (std::size_t j = 0; j < key.size(); ++j) entries[next[key[j]]++] = static_cast<int>(j);
+}
+
+// Greedy colouring: patches of one colour share no vertex.
+std::vector<std::vector<int>> colour(Patches const& p) {
+  int const count = p.count();
+  std::vector<int> colour_of(count, -1);
+  std::vector<int> owner(p.vertex.size());
+  for (int q = 0; q < count; ++q) {
+    std::fill(owner.begin() + p.local_begin[q], owner.begin() + p.local_begin[q + 1], q);
+  }
+  std::vector<std::vector<int>> colours;
+  std::vector<int> taken;  // taken[c] == q: colour c is used by a neighbour of q
+  for (int q = 0; q < count; ++q) {
+    for (int l = p.local_begin[q]; l < p.local_begin[q + 1]; ++l) {
+      int const v = p.vertex[l];
+      for (int k = p.occurrence_begin[v]; k < p.occurrence_begin[v + 1]; ++k) {
+        int const neighbour = owner[p.occurrence[k]];
+        if (colour_of[neighbour] >= 0) taken[colour_of[neighbour]] = q;
+      }
+    }
+    int c = 0;
+    while (c < static_cast<int>(colours.size()) && taken[c] == q) ++c;
+    if (c == static_cast<int>(colours.size())) {
+      colours.emplace_back();
+      taken.push_back(-1);
+    }
+    colour_of[q] = c;
+    colours[c].push_back(q);
+  }
+  return colours;
+}
+
+}  // namespace
+
+Patches make_patches(std::span<Tet const> tets, std::span<int const> material, int vertices,
+                     int lanes, int patch_size) {
+  Patches p;
+  p.lanes = lanes;
+  p.pack_begin = {0};
+  p.local_begin = {0};
+  p.incidence_begin = {0};
+  std::vector<int> local_of(vertices, -1);  // local index of a vertex in the patch being built
+  int const count = static_cast<int>(tets.size());
+  for (int first = 0; first < count;) {
+    int last = first;
+    while (last < count && last - first < patch_size && material[last] == material[first]) ++last;
+    int const packs = (last - first + lanes - 1) / lanes;
+    int const pack0 = p.pack_begin.back(), local0 = p.local_begin.back();
+    p.corner.resize(std::size_t(pack0 + packs) * 4 * lanes);
+    std::vector<int> slot_vertex(std::size_t(packs) * 4 * lanes, -1);
+    for (int e = 0; e < packs * lanes; ++e) {
+      int const t = std::min(first + e, last - 1);
+      bool const padding = first + e >= last;
+      p.tet.push_back(t);
+      p.padding.push_back(padding);
+      for (int a = 0; a < 4; ++a) {
+        int const v = tets[t][a];
+        if (local_of[v] < 0) {
+          local_of[v] = static_cast<int>(p.vertex.size()) - local0;
+          p.vertex.push_back(v);
+        }
+        int const slot = (e / lanes * 4 + a) * lanes + e % lanes;
+        p.corner[std::size_t(pack0) * 4 * lanes + slot] = static_cast<std::uint16_t>(local_of[v]);
+        if (!padding) slot_vertex[slot] = local_of[v];
+      }
+    }
+    int const locals = static_cast<int>(p.vertex.size()) - local0;
+    // Incidence in element order, so that a sum over it equals a serial scatter over the elements.
+    std::vector<std::vector<std::uint16_t>> slots(locals);
+    for (int e = 0; e < packs * lanes; ++e) {
+      for (int a = 0; a < 4; ++a) {
+        int const slot = (e / lanes * 4 + a) * lanes + e % lanes;
+        if (slot_vertex[slot] >= 0) {
+          slots[slot_vertex[slot]].push_back(static_cast<std::uint16_t>(slot));
+        }
+      }
+    }
+    for (auto const& s : slots) {
+      p.incidence.insert(p.incidence.end(), s.begin(), s.end());
+      p.incidence_begin.push_back(static_cast<int>(p.incidence.size()));
+    }
+    for (std::size_t l = local0; l < p.vertex.size(); ++l) local_of[p.vertex[l]] = -1;
+    p.pack_begin.push_back(pack0 + packs);
+    p.local_begin.push_back(static_cast<int>(p.vertex.size()));
+    p.material.push_back(material[first]);
+    p.max_packs = std::max(p.max_packs, packs);
+    p.max_locals = std::max(p.max_locals, locals);
+    first = last;
+  }
+  compress(p.vertex, vertices, p.occurrence_begin, p.occurrence);
+  p.colours = colour(p);
+  return p;
+}
+
+}  // namespace taut

@@ -1,0 +1,105 @@
+// Patches: runs of neighbouring tets that one team of threads processes together, so that vertex
+// data are read once per patch and forces are added up in fast memory.
+//
+// A sweep over a patch (1) copies the data of its vertices to local memory, (2) computes its
+// elements, a pack of them at a time, and leaves what each corner receives in a slot, (3) adds up
+// the slots of each local vertex in a fixed order and writes one partial sum. A second loop over
+// the vertices adds up their partial sums over patches, again in a fixed order. No atomics; the
+// result depends neither on the number of threads nor on the size of a team.
+#pragma once
+
+#include <taut/core/exec/space.hpp>
+#include <taut/core/fem/tet_mesh.hpp>
+#include <taut/core/math/scalar.hpp>
+
+#include <span>
+#include <string>
+#include <vector>
+
+namespace taut {
+
+/// The patches of a list of tets, on the host. Element e of pack k sits in lane e; the tail of a
+/// patch is padded with copies of its last tet, which have no weight and no incidence.
+struct Patches {
+  int lanes = 1;                          ///< elements per pack
+  std::vector<int> pack_begin;            ///< per patch, +1: its packs
+  std::vector<int> local_begin;           ///< per patch, +1: its local vertices
+  std::vector<int> material;              ///< per patch
+  std::vector<int> vertex;                ///< per local vertex: vertex of the mesh
+  std::vector<int> tet;                   ///< per element: index into the list
+  std::vector<char> padding;              ///< per element: 1 for a padding copy
+  std::vector<std::uint16_t> corner;      ///< [pack][corner][lane]: local vertex within its patch
+  std::vector<int> incidence_begin;       ///< per local vertex, +1
+  std::vector<std::uint16_t> incidence;   ///< slot (pack within patch * 4 + corner) * lanes + lane
+  std::vector<int> occurrence_begin;      ///< per vertex of the mesh, +1
+  std::vector<int> occurrence;            ///< its local vertices, ascending
+  std::vector<std::vector<int>> colours;  ///< patches that share no vertex, for assembly
+  int max_locals = 0, max_packs = 0;
+
+  int count() const { return static_cast<int>(material.size()); }
+};
+
+/// `tets` in locality-preserving order, with vertices below `vertices`; `material[t]` of each. A
+/// patch holds up to `patch_size` tets of one material.
+Patches make_patches(std::span<Tet const> tets, std::span<int const> material, int vertices,
+                     int lanes, int patch_size);
+
+/// The patches where the kernels read them, with the rest shape of the elements.
+template <class S, class Real>
+struct PatchViews {
+  template <class T>
+  using Data =
+      Kokkos::View<T const*, typename S::memory, Kokkos::MemoryTraits<Kokkos::RandomAccess>>;
+
+  /// Elements per pack: one register on the host, one warp on a device.
+  static constexpr int lanes = S::on_host ? host_lanes<Real> : 32;
+
+  int count = 0, locals = 0, max_locals = 0, max_packs = 0;
+  Data<int> pack_begin, local_begin, material, vertex, incidence_begin, occurrence_begin,
+      occurrence;
+  Data<std::uint16_t> corner, incidence;
+  /// [pack][10][lane]: the inverse rest shape B = Dm^-1 by columns, then the rest volume W.
+  Data<Real> rest;
+};
+
+/// Copies a host vector to a space.
+template <class S, class T>
+Kokkos::View<T const*, typename S::memory, Kokkos::MemoryTraits<Kokkos::RandomAccess>> to_space(
+    char const* name, std::vector<T> const& from) {
+  Kokkos::View<T*, typename S::memory> to(
+      Kokkos::view_alloc(Kokkos::WithoutInitializing, std::string(name)), from.size());
+  Kokkos::View<T const*, Kokkos::HostSpace, Kokkos::MemoryTraits<Kokkos::Unmanaged>> host(
+      from.data(), from.size());
+  Kokkos::deep_copy(to, host);
+  return to;
+}
+
+/// `rest` holds ten doubles per element of `patches` (B by columns, W).
+template <class S, class Real>
+PatchViews<S, Real> copy_patches(Patches const& patches, std::vector<double> const& rest) {
+  PatchViews<S, Real> v;
+  v.count = patches.count();
+  v.locals = static_cast<int>(patches.vertex.size());
+  v.max_locals = patches.max_locals;
+  v.max_packs = patches.max_packs;
+  v.pack_begin = to_space<S>("patch_packs", patches.pack_begin);
+  v.local_begin = to_space<S>("patch_locals", patches.local_begin);
+  v.material = to_space<S>("patch_material", patches.material);
+  v.vertex = to_space<S>("patch_vertex", patches.vertex);
+  v.incidence_begin = to_space<S>("patch_incidence_begin", patches.incidence_begin);
+  v.incidence = to_space<S>("patch_incidence", patches.incidence);
+  v.occurrence_begin = to_space<S>("patch_occurrence_begin", patches.occurrence_begin);
+  v.occurrence = to_space<S>("patch_occurrence", patches.occurrence);
+  v.corner = to_space<S>("patch_corner", patches.corner);
+  std::vector<Real> packed(rest.size());
+  constexpr std::size_t lanes = PatchViews<S, Real>::lanes;
+  for (std::size_t e = 0; e < rest.size() / 10; ++e) {
+    for (std::size_t k = 0; k < 10; ++k) {
+      packed[(e / lanes * 10 + k) * lanes + e % lanes] = static_cast<Real>(rest[10 * e + k]);
+    }
+  }
+  v.rest = to_space<S>("patch_rest", packed);
+  return v;
+}
+
+}  // namespace taut

@@ -1,0 +1,87 @@
+// The result of a run: one VTKHDF file of an unstructured grid with fixed topology and time steps
+// (https://docs.vtk.org/en/latest/vtk_file_formats/vtkhdf_file_format/index.html), which VTK 9.3
+// and ParaView 5.12 open, and an XDMF sidecar that points into it for older ParaViews.
+//
+//   Points (moving, m), PointData/velocity (m/s), CellData/object (number of the object a tet is
+//   of); /taut/object_names: the objects' names in that numbering.
+//
+// A run may be killed at any moment, or its disk may fill: every finished frame stays readable. The
+// file has its final layout from the start, laid out for `capacity` frames (unwritten ones are
+// holes that take no disk space). A frame is first written to its own place; one write of one file
+// page then makes it part of the result (vtkhdf_writer.cpp). A viewer may have the file open
+// meanwhile.
+#pragma once
+
+#include <cstdint>
+#include <filesystem>
+#include <memory>
+#include <span>
+#include <string>
+#include <taut/core/fem/tet_mesh.hpp>
+#include <vector>
+
+namespace taut {
+
+/// What does not change between frames.
+struct ResultMesh {
+  TetMesh mesh;                           ///< points: at t = 0
+  std::vector<std::int32_t> object;       ///< per tet, an index into object_names
+  std::vector<std::string> object_names;  ///< UTF-8
+};
+
+class ResultWriter {
+public:
+  enum class IfExists { refuse, replace };
+
+  /// Begins a result at `path` (name it .vtkhdf) laid out for `capacity` frames; missing folders
+  /// are made, the layout grows if more are appended. `velocities`: whether frames carry them.
+  /// Throws Error if the file exists and is not to be replaced, or if it cannot be written.
+  static ResultWriter create(std::filesystem::path const& path, ResultMesh const& mesh,
+                             std::int64_t capacity, IfExists if_exists, bool velocities = true);
+
+  /// Goes on with an existing result after its first `frames` frames; later ones are dropped.
+  /// Throws Error if the file is not a result of the same mesh or has fewer frames.
+  static ResultWriter resume(std::filesystem::path const& path, ResultMesh const& mesh,
+                             std::int64_t frames, std::int64_t capacity);
+
+  ResultWriter(ResultWriter&&) noexcept;
+  ResultWriter& operator=(ResultWriter&&) noexcept;
+  ~ResultWriter();
+
+  /// Appends the frame at `time` (s): positions (m) and velocities (m/s; empty if the result has
+  /// none), one per point. Throws Error if it cannot be written; the earlier frames are then
+  /// intact.
+  void append(double time, std::span<Point const> positions, std::span<Point const> velocities);
+
+  std::int64_t frames() const;
+
+private:
+  struct File;
+  explicit ResultWriter(std::unique_ptr<File> file);
+  std::unique_ptr<File> file_;
+};
+
+class ResultReader {
+public:
+  /// Throws Error if `path` is no result of this library.
+  explicit ResultReader(std::filesystem::path const& path);
+  ResultReader(ResultReader&&) noexcept;
+  ResultReader& operator=(ResultReader&&) noexcept;
+  ~ResultReader();
+
+  std::int64_t frames() const;
+  std::int64_t capacity() const;             ///< frames the file is laid out for
+  std::vector<double> const& times() const;  ///< s, one per frame
+  ResultMesh const& mesh() const;            ///< its points are those of t = 0
+  bool has_velocities() const;
+
+  /// One per point; 0 <= frame < frames(). Throws Error otherwise, or if the file cannot be read.
+  std::vector<Point> positions(std::int64_t frame) const;   ///< m
+  std::vector<Point> velocities(std::int64_t frame) const;  ///< m/s
+
+private:
+  struct File;
+  std::unique_ptr<File> file_;
+};
+
+}  // namespace taut

@@ -1,0 +1,127 @@
+#include <algorithm>
+#include <cstring>
+#include <taut/core/io/file.hpp>
+#include <taut/core/io/hdf5.hpp>
+#include <taut/core/io/vtkhdf.hpp>
+
+namespace taut {
+namespace {
+
+using hdf5::Handle;
+
+std::vector<Point> read_points(hid_t dataset, std::int64_t first, std::size_t rows) {
+  std::vector<Point> points(rows);
+  hdf5::read_rows(dataset, H5T_NATIVE_DOUBLE, static_cast<hsize_t>(first), rows, points.data(),
+                  "a frame cannot be read");
+  return points;
+}
+
+/// Throws Error unless `dataset` holds one vector per point and frame.
+void check_shape(hid_t dataset, std::size_t points, std::int64_t frames) {
+  const hdf5::Shape shape = hdf5::shape_of(dataset);
+  if (shape.size() != 2 || shape[1] != 3 || shape[0] < points * static_cast<std::size_t>(frames)) {
+    throw Error("its point data have another size than its steps need");
+  }
+}
+
+ResultMesh read_mesh(hid_t file) {
+  ResultMesh result;
+  const Handle points = hdf5::open_dataset(file, "taut/points");
+  const hdf5::Shape shape = hdf5::shape_of(points);
+  if (shape.size() != 2 || shape[1] != 3) throw Error("its points are not in three dimensions");
+  result.mesh.points = read_points(points, 0, shape[0]);
+  result.object_names = hdf5::read_strings(file, "taut/object_names");
+  result.object = hdf5::read_dataset<std::int32_t>(file, "VTKHDF/CellData/object");
+
+  const auto ids = hdf5::read_dataset<std::int32_t>(file, "VTKHDF/Connectivity");
+  const bool in_range = std::all_of(ids.begin(), ids.end(), [&](std::int32_t id) {
+    return id >= 0 && static_cast<std::size_t>(id) < result.mesh.points.size();
+  });
+  if (!in_range || ids.size() != 4 * result.object.size()) {
+    throw Error("its cells are not tets of its points");
+  }
+  result.mesh.tets.reserve(ids.size() / 4);
+  for (std::size_t i = 0; i < ids.size(); i += 4) {
+    result.mesh.tets.push_back({ids[i], ids[i + 1], ids[i + 2], ids[i + 3]});
+  }
+  return result;
+}
+
+}  // namespace
+
+struct ResultReader::File {
+  explicit File(std::filesystem::path const& path) : path_(path) {
+    const hdf5::Quiet quiet;
+    try {
+      file_ = hdf5::open_file(path, H5F_ACC_RDONLY);
+      mesh_ = read_mesh(file_);
+      const Handle steps = hdf5::open_group(file_, "VTKHDF/Steps");
+      const std::int64_t frames = hdf5::read_attribute(steps, "NSteps");
+      times_ = hdf5::read_dataset<double>(steps, "Values");
+      if (frames < 0 || frames > std::ssize(times_)) throw Error("its steps and times differ");
+      times_.resize(static_cast<std::size_t>(frames));
+      points_ = hdf5::open_dataset(file_, "VTKHDF/Points");
+      check_shape(points_, mesh_.mesh.points.size(), frames);
+      capacity_ = static_cast<std::int64_t>(
+          hdf5::shape_of(hdf5::open_dataset(steps, "PointOffsets")).at(0));
+      const Handle point_data = hdf5::open_group(file_, "VTKHDF/PointData");
+      if (H5Lexists(point_data, "velocity", H5P_DEFAULT) > 0) {
+        velocity_ = hdf5::open_dataset(point_data, "velocity");
+        check_shape(velocity_, mesh_.mesh.points.size(), frames);
+      }
+    } catch (Error const& error) {
+      throw Error(
+          "{}: this is no result of a run that can be read, because {}; name the .vtkhdf "
+          "file that 'run' wrote.",
+          path.string(), error.what());
+    }
+  }
+
+  std::vector<Point> read(hid_t dataset, std::int64_t frame) const {
+    if (frame < 0 || frame >= std::ssize(times_)) {
+      throw Error("{}: there is no frame {}, the result has {} (counted from 0).", path_.string(),
+                  frame, times_.size());
+    }
+    const hdf5::Quiet quiet;
+    const std::size_t n = mesh_.mesh.points.size();
+    return read_points(dataset, frame * static_cast<std::int64_t>(n), n);
+  }
+
+  std::filesystem::path path_;
+  Handle file_;
+  Handle points_;
+  Handle velocity_;
+  ResultMesh mesh_;
+  std::vector<double> times_;
+  std::int64_t capacity_ = 0;
+};
+
+ResultReader::ResultReader(std::filesystem::path const& path) {
+  if (!std::filesystem::exists(path)) {
+    throw Error("{}: there is no such result (looked for {}); correct the name or run the scene.",
+                path.string(), std::filesystem::absolute(path).string());
+  }
+  file_ = std::make_unique<File>(path);
+}
+ResultReader::ResultReader(ResultReader&&) noexcept = default;
+ResultReader& ResultReader::operator=(ResultReader&&) noexcept = default;
+ResultReader::~ResultReader() = default;
+
+std::int64_t ResultReader::frames() const { return std::ssize(file_->times_); }
+std::int64_t ResultReader::capacity() const { return file_->capacity_; }
+std::vector<double> const& ResultReader::times() const { return file_->times_; }
+ResultMesh const& ResultReader::mesh() const { return file_->mesh_; }
+bool ResultReader::has_velocities() const { return file_->velocity_ >= 0; }
+
+std::vector<Point> ResultReader::positions(std::int64_t frame) const {
+  return file_->read(file_->points_, frame);
+}
+
+std::vector<Point> ResultReader::velocities(std::int64_t frame) const {
+  if (!has_velocities()) {
+    throw Error("{}: this result was written without velocities.", file_->path_.string());
+  }
+  return file_->read(file_->velocity_, frame);
+}
+
+}  // namespace taut

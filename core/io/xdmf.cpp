@@ -1,0 +1,88 @@
+#include <fmt/format.h>
+
+#include <taut/core/io/file.hpp>
+#include <taut/core/io/xdmf.hpp>
+
+namespace taut {
+namespace {
+
+std::string escaped(std::string const& text) {
+  std::string xml;
+  for (const char c : text) {
+    switch (c) {
+      case '&':
+        xml += "&amp;";
+        break;
+      case '<':
+        xml += "&lt;";
+        break;
+      case '>':
+        xml += "&gt;";
+        break;
+      default:
+        xml += c;
+    }
+  }
+  return xml;
+}
+
+}  // namespace
+
+XdmfSidecar::XdmfSidecar(std::filesystem::path const& path, ResultShape const& shape)
+    : path_(std::filesystem::path(path).replace_extension(".xdmf")),
+      result_(escaped(path.filename().string())),
+      shape_(shape) {}
+
+void XdmfSidecar::restart(std::span<double const> times) {
+  frames_ = 0;
+  steps_.clear();
+  for (const double time : times) add(time);
+  write();
+}
+
+void XdmfSidecar::append(double time) {
+  add(time);
+  write();
+}
+
+void XdmfSidecar::add(double time) {
+  const auto capacity = static_cast<std::size_t>(shape_.capacity);
+  // VTK's reader takes the first thing inside a DataItem for the name under which it caches the
+  // geometry: the comment gives each frame its own.
+  const auto rows = [&](std::string_view dataset) {
+    return fmt::format(
+        "<DataItem ItemType=\"HyperSlab\" Dimensions=\"{0} 3\"><!--frame {5}-->"
+        "<DataItem Dimensions=\"3 2\" NumberType=\"Int\" Format=\"XML\">{1} 0 1 1 {0} 3</DataItem>"
+        "<DataItem Dimensions=\"{2} 3\" NumberType=\"Float\" Precision=\"8\" Format=\"HDF\">"
+        "{3}:/VTKHDF/{4}</DataItem></DataItem>",
+        shape_.points, static_cast<std::size_t>(frames_) * shape_.points, capacity * shape_.points,
+        result_, dataset, frames_);
+  };
+  steps_ += fmt::format(
+      "<Grid Name=\"frame {0}\"><Time Value=\"{1}\"/>\n"
+      "<Topology TopologyType=\"Tetrahedron\" NumberOfElements=\"{2}\">"
+      "<DataItem Dimensions=\"{3}\" NumberType=\"Int\" Precision=\"8\" Format=\"HDF\">"
+      "{4}:/VTKHDF/Connectivity</DataItem></Topology>\n"
+      "<Geometry GeometryType=\"XYZ\">{5}</Geometry>\n"
+      "<Attribute Name=\"object\" Center=\"Cell\">"
+      "<DataItem Dimensions=\"{2}\" NumberType=\"Int\" Precision=\"4\" Format=\"HDF\">"
+      "{4}:/VTKHDF/CellData/object</DataItem></Attribute>\n",
+      frames_, time, shape_.tets, 4 * shape_.tets, result_, rows("Points"));
+  if (shape_.velocities) {
+    steps_ += fmt::format(
+        "<Attribute Name=\"velocity\" AttributeType=\"Vector\" Center=\"Node\">{}</Attribute>\n",
+        rows("PointData/velocity"));
+  }
+  steps_ += "</Grid>\n";
+  ++frames_;
+}
+
+void XdmfSidecar::write() const {
+  write_file_atomically(path_,
+                        fmt::format("<?xml version=\"1.0\"?>\n<Xdmf Version=\"2.0\"><Domain>\n"
+                                    "<Grid Name=\"result\" GridType=\"Collection\" "
+                                    "CollectionType=\"Temporal\">\n{}</Grid>\n</Domain></Xdmf>\n",
+                                    steps_));
+}
+
+}  // namespace taut

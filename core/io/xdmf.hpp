@@ -1,0 +1,43 @@
+// The XDMF sidecar of a result: XML that names, per time step, the parts of the VTKHDF file's
+// datasets (https://www.xdmf.org/index.php/XDMF_Model_and_Format), for viewers that cannot read
+// VTKHDF steps.
+#pragma once
+
+#include <cstdint>
+#include <filesystem>
+#include <span>
+#include <string>
+
+namespace taut {
+
+/// The sizes of the datasets that an XdmfSidecar points into.
+struct ResultShape {
+  std::size_t points = 0;
+  std::size_t tets = 0;
+  std::int64_t capacity = 0;  ///< frames the datasets have room for
+  bool velocities = true;
+};
+
+class XdmfSidecar {
+public:
+  /// For the result at `path`; the sidecar lies beside it as <stem>.xdmf. Nothing is written yet.
+  XdmfSidecar(std::filesystem::path const& path, ResultShape const& shape);
+
+  /// Starts over with these frames, and writes the sidecar.
+  void restart(std::span<double const> times);
+  /// Adds the next frame and replaces the sidecar in one step. Throws Error if it cannot be
+  /// written.
+  void append(double time);
+
+private:
+  void add(double time);
+  void write() const;
+
+  std::filesystem::path path_;
+  std::string result_;  // file name of the result, seen from the sidecar
+  ResultShape shape_;
+  std::int64_t frames_ = 0;
+  std::string steps_;  // the XML of all steps so far
+};
+
+}  // namespace taut

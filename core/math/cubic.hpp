@@ -1,0 +1,64 @@
+// Where a cubic first reaches zero: the exact step bound of a tetrahedron's volume along a line.
+#pragma once
+
+#include <Kokkos_Core.hpp>
+
+#include <cfloat>
+
+namespace taut {
+
+/// Smallest t > 0 with a + b t + c t^2 + d t^3 <= 0, for a > 0; infinity if there is none. Never
+/// larger than the root by more than the rounding of the polynomial's evaluation: the lower end of
+/// the final bracket is returned. For a <= 0 the answer is 0. NaN coefficients give 0.
+KOKKOS_INLINE_FUNCTION double smallest_positive_root(double a, double b, double c, double d) {
+  constexpr double infinity = Kokkos::Experimental::infinity_v<double>;
+  if (!(a > 0) || !(Kokkos::abs(b) + Kokkos::abs(c) + Kokkos::abs(d) < infinity)) return 0;
+  auto const f = [&](double t) { return a + t * (b + t * (c + t * d)); };
+  // Between its stationary points a cubic is monotone: look for the first piece that ends below
+  // zero.
+  double stationary[2] = {infinity, infinity};
+  double const discriminant = c * c - 3 * b * d;
+  if (discriminant > 0) {
+    // Roots of b + 2 c t + 3 d t^2 without cancellation.
+    double const q = -(c + (c < 0 ? -1 : 1) * Kokkos::sqrt(discriminant));
+    double const r0 = d != 0 ? q / (3 * d) : infinity, r1 = q != 0 ? b / q : infinity;
+    stationary[0] = Kokkos::min(r0, r1);
+    stationary[1] = Kokkos::max(r0, r1);
+  }
+  double low = 0, high = infinity;
+  for (double s : stationary) {
+    if (!(s > low) || !(s < infinity)) continue;
+    if (f(s) <= 0) {
+      high = s;
+      break;
+    }
+    low = s;
+  }
+  if (high == infinity) {
+    // The last piece: it ends below zero only if the leading coefficient is negative.
+    double const leading = d != 0 ? d : (c != 0 ? c : b);
+    if (!(leading < 0)) return infinity;
+    high = low > 0 ? 2 * low : 1;
+    while (f(high) > 0) {
+      low = high;
+      high *= 2;
+      if (!(high < DBL_MAX / 2)) return infinity;
+    }
+  }
+  // Newton steps inside a shrinking bracket [f > 0, f <= 0]; bisection where Newton leaves it.
+  for (int k = 0; k < 100 && high - low > 4 * DBL_EPSILON * high; ++k) {
+    double const middle = 0.5 * (low + high);
+    double const value = f(middle), slope = b + middle * (2 * c + middle * 3 * d);
+    double const newton = slope != 0 ? middle - value / slope : middle;
+    (value > 0 ? low : high) = middle;
+    // A little short of and a little past the Newton point, so that both ends close in.
+    double const margin = 1e-3 * (high - low);
+    if (newton - margin > low && newton + margin < high) {
+      if (f(newton - margin) > 0) low = newton - margin;
+      if (f(newton + margin) <= 0) high = newton + margin;
+    }
+  }
+  return low;
+}
+
+}  // namespace taut

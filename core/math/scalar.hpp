@@ -1,0 +1,150 @@
+// The scalar vocabulary of the kernels: one function name for a float, a double and a SIMD pack of
+// them, so that a kernel is written once as straight-line arithmetic and instantiated with a pack
+// of elements per register on the host and with a plain scalar per thread on the device.
+//
+// Packs are Kokkos' SIMD types; nothing here adds a SIMD layer of its own. What is added is a
+// branch that works lane by lane (`select`) and the elementary functions that Kokkos evaluates one
+// lane at a time (min, max, log).
+#pragma once
+
+#include <Kokkos_Core.hpp>
+#include <Kokkos_SIMD.hpp>
+
+#include <cstdint>
+#include <type_traits>
+
+namespace taut {
+
+template <class T>
+struct ScalarTraits {
+  using value_type = T;
+  static constexpr int lanes = 1;
+};
+
+template <class T, class Abi>
+struct ScalarTraits<Kokkos::Experimental::basic_simd<T, Abi>> {
+  using value_type = T;
+  static constexpr int lanes = static_cast<int>(Kokkos::Experimental::basic_simd<T, Abi>::size());
+};
+
+/// float or double behind a scalar or a pack.
+template <class T>
+using ValueType = typename ScalarTraits<T>::value_type;
+
+template <class T>
+inline constexpr bool is_pack = !std::is_arithmetic_v<T>;
+
+/// Lanes of `Real` in one register of the host (1 where Kokkos knows no SIMD for it).
+template <class Real>
+inline constexpr int host_lanes = [] {
+  constexpr auto doubles = Kokkos::Experimental::basic_simd<
+      double,
+      Kokkos::Experimental::simd_abi::Impl::native_fixed_abi<double, Kokkos::Serial>>::size();
+  return doubles == 1 ? 1 : static_cast<int>(doubles * sizeof(double) / sizeof(Real));
+}();
+
+template <class Real, int lanes>
+struct PackOf {
+  using type = Kokkos::Experimental::basic_simd<
+      Real, Kokkos::Experimental::simd_abi::Impl::native_abi<lanes, Kokkos::Serial>>;
+};
+template <class Real>
+struct PackOf<Real, 1> {
+  using type = Real;
+};
+
+/// The pack of `Real` that fills one register of the host.
+template <class Real>
+using HostPack = typename PackOf<Real, host_lanes<Real>>::type;
+
+template <class T>
+requires std::is_arithmetic_v<T> KOKKOS_FORCEINLINE_FUNCTION T select(bool mask, T a, T b) {
+  return mask ? a : b;
+}
+
+template <class T, class Abi>
+KOKKOS_FORCEINLINE_FUNCTION Kokkos::Experimental::basic_simd<T, Abi> select(
+    Kokkos::Experimental::basic_simd_mask<T, Abi> const& mask,
+    Kokkos::Experimental::basic_simd<T, Abi> const& a,
+    Kokkos::Experimental::basic_simd<T, Abi> const& b) {
+  return Kokkos::Experimental::condition(mask, a, b);
+}
+
+template <class T>
+KOKKOS_FORCEINLINE_FUNCTION T min(T const& a, T const& b) {
+  return select(b < a, b, a);
+}
+
+template <class T>
+KOKKOS_FORCEINLINE_FUNCTION T max(T const& a, T const& b) {
+  return select(a < b, b, a);
+}
+
+template <class T>
+KOKKOS_FORCEINLINE_FUNCTION T square(T const& a) {
+  return a * a;
+}
+
+using Kokkos::abs;
+using Kokkos::sqrt;
+
+/// Lane `i` of a pack; a scalar has one lane.
+template <class T>
+KOKKOS_FORCEINLINE_FUNCTION ValueType<T> lane(T const& a, int i) {
+  if constexpr (is_pack<T>) {
+    return a[static_cast<std::size_t>(i)];
+  } else {
+    (void)i;
+    return a;
+  }
+}
+
+/// Loads lanes from consecutive memory.
+template <class T>
+KOKKOS_FORCEINLINE_FUNCTION T load(ValueType<T> const* from) {
+  if constexpr (is_pack<T>) {
+    T r;
+    r.copy_from(from, Kokkos::Experimental::simd_flag_default);
+    return r;
+  } else {
+    return *from;
+  }
+}
+
+/// Stores lanes to consecutive memory.
+template <class T>
+KOKKOS_FORCEINLINE_FUNCTION void store(T const& a, ValueType<T>* to) {
+  if constexpr (is_pack<T>) {
+    a.copy_to(to, Kokkos::Experimental::simd_flag_default);
+  } else {
+    *to = a;
+  }
+}
+
+/// Collects lane i from `from[index[i]]`.
+template <class T, class Index>
+KOKKOS_FORCEINLINE_FUNCTION T gather(ValueType<T> const* from, Index const* index) {
+  if constexpr (is_pack<T>) {
+    return T([&](std::size_t i) { return from[index[i]]; });
+  } else {
+    return from[*index];
+  }
+}
+
+/// Sum over the lanes in fp64, always in lane order.
+template <class T>
+KOKKOS_FORCEINLINE_FUNCTION double sum_lanes(T const& a) {
+  double sum = 0;
+  for (int i = 0; i < ScalarTraits<T>::lanes; ++i) sum += static_cast<double>(lane(a, i));
+  return sum;
+}
+
+/// Smallest lane.
+template <class T>
+KOKKOS_FORCEINLINE_FUNCTION ValueType<T> min_lanes(T const& a) {
+  ValueType<T> smallest = lane(a, 0);
+  for (int i = 1; i < ScalarTraits<T>::lanes; ++i) smallest = Kokkos::min(smallest, lane(a, i));
+  return smallest;
+}
+
+}  // namespace taut

@@ -1,0 +1,70 @@
+// What a minimiser sees: a function of one 3-vector per unknown, its derivatives, and how far a
+// step may go. Mesh vertices and grid nodes look the same from here; no minimiser knows more than
+// this.
+//
+// The function is the incremental potential E(x) = 1/2 |x - x~|^2_M + h^2 (elastic + ...), in kg
+// m^2 (see docs/design.md, section 4).
+#pragma once
+
+#include <taut/core/exec/space.hpp>
+#include <taut/core/sparse/block_csr.hpp>
+
+#include <concepts>
+
+namespace taut {
+
+/// The quantities of the problem in which stopping rules measure (SI units).
+struct Scale {
+  double mass = 1;          ///< total mass of the free unknowns, kg
+  double length = 1;        ///< a length of the scene (mean rest edge length), m
+  double time_step = 1;     ///< h, s: turns an error of position into one of velocity
+  bool has_inertia = true;  ///< false in a quasi-static solve: H >= M does not hold then
+};
+
+/// Fields with one entry per unknown. Unknowns that are fixed (pinned) have zero gradient, zero
+/// rows and columns in products, and the identity times their mass in `assemble` and in curvature
+/// fields. All "curvature" is the filtered one (positive semi-definite per element, by the filter
+/// policy of each term); `value`, `difference` and `gradient` are exact.
+template <class E>
+concept Objective =
+    requires(E& e, VectorField<typename E::Precision::position, typename E::Space> const& x,
+             VectorField<typename E::Precision::real, typename E::Space> const& p,
+             BlockField<typename E::Precision::real, typename E::Space> const& blocks,
+             BlockCsr<typename E::Space, double>& matrix, double alpha) {
+  typename E::Space;
+  typename E::Precision;
+  { e.size() } -> std::convertible_to<int>;
+  { e.scale() } -> std::convertible_to<Scale>;
+  /// Lumped mass per unknown, kg; the metric of the stopping rules.
+  { e.mass() } -> std::convertible_to<Array<typename E::Precision::real, typename E::Space>>;
+
+  /// E(x), summed in Precision::sum.
+  { e.value(x) } -> std::convertible_to<double>;
+  /// E(x + alpha p) - E(x), from differences per element: no cancellation of large sums.
+  { e.difference(x, p, alpha) } -> std::convertible_to<double>;
+  /// Gradient at x into the second argument; optionally with the diagonal (3 numbers per unknown)
+  /// or the diagonal 3x3 blocks (6 numbers per unknown) of the curvature.
+  {e.gradient(x, p)};
+  {e.gradient(x, p, p)};
+  {e.gradient(x, p, blocks)};
+  /// The same at x, after a step of alpha p that led to x; returns E(x) - E(x - alpha p) from the
+  /// same sweep, which is what a sufficient-decrease check needs.
+  { e.gradient_after(x, p, alpha, p) } -> std::convertible_to<double>;
+  { e.gradient_after(x, p, alpha, p, p) } -> std::convertible_to<double>;
+  { e.gradient_after(x, p, alpha, p, blocks) } -> std::convertible_to<double>;
+  /// p' H(x) p >= 0.
+  { e.quadratic_form(x, p) } -> std::convertible_to<double>;
+  /// hp = H(x) p, with the curvature projected exactly.
+  {e.product(x, p, p)};
+  /// H(x), with the curvature projected exactly, into a matrix made by `pattern()`.
+  { e.pattern() } -> std::same_as<BlockCsr<typename E::Space, double>>;
+  {e.assemble(x, matrix)};
+  /// Largest alpha in (0, infinity] such that x + a p is valid for all a < alpha (an element that
+  /// forbids inversion reaches J = 0 there); infinity when nothing limits the step.
+  { e.max_step(x, p) } -> std::convertible_to<double>;
+  /// Moves fixed unknowns on towards where they are prescribed to be, as far as is valid; true if x
+  /// changed, after which gradient and energy must be evaluated anew. False once all have arrived.
+  { e.advance_prescribed(x) } -> std::convertible_to<bool>;
+};
+
+}  // namespace taut

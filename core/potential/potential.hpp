@@ -1,0 +1,467 @@
+// The incremental potential: a sum of terms over common unknowns, as one Objective for any
+// minimiser.
+//
+//   using Scene = Potential<Inertia<>, BodyForce<>, ElasticTets<Elastic<StableNeoHookean>>>;
+//
+// A term that is not named does not exist in any loop. h^2 is applied here and nowhere else.
+#pragma once
+
+#include <taut/core/exec/parallel.hpp>
+#include <taut/core/potential/local_terms.hpp>
+#include <taut/core/potential/objective.hpp>
+#include <taut/core/report/error.hpp>
+#include <taut/core/sparse/pattern.hpp>
+
+#include <limits>
+#include <tuple>
+
+namespace taut {
+
+namespace kernels {
+
+/// The kernels of all local terms, one after the other.
+template <class... Ks>
+struct LocalKernels;
+
+template <>
+struct LocalKernels<> {
+  KOKKOS_FUNCTION double value(int, Vec3<double> const&) const { return 0; }
+  KOKKOS_FUNCTION double change(int, Vec3<double> const&, Vec3<double> const&) const { return 0; }
+  KOKKOS_FUNCTION Vec3<double> gradient(int, Vec3<double> const&) const { return {}; }
+  KOKKOS_FUNCTION Sym3<double> curvature(int, Vec3<double> const&) const { return {}; }
+};
+
+template <class K, class... Ks>
+struct LocalKernels<K, Ks...> {
+  K head;
+  LocalKernels<Ks...> tail;
+
+  KOKKOS_FUNCTION double value(int i, Vec3<double> const& x) const {
+    return head.value(i, x) + tail.value(i, x);
+  }
+  KOKKOS_FUNCTION double change(int i, Vec3<double> const& x, Vec3<double> const& s) const {
+    return head.change(i, x, s) + tail.change(i, x, s);
+  }
+  KOKKOS_FUNCTION Vec3<double> gradient(int i, Vec3<double> const& x) const {
+    return head.gradient(i, x) + tail.gradient(i, x);
+  }
+  KOKKOS_FUNCTION Sym3<double> curvature(int i, Vec3<double> const& x) const {
+    Sym3<double> a = head.curvature(i, x), b = tail.curvature(i, x);
+    for (int k = 0; k < 6; ++k) a.s[k] += b.s[k];
+    return a;
+  }
+};
+
+inline LocalKernels<> chain() { return {}; }
+template <class K, class... Ks>
+LocalKernels<K, Ks...> chain(K const& head, Ks const&... tail) {
+  return {head, chain(tail...)};
+}
+
+template <class Field>
+KOKKOS_FORCEINLINE_FUNCTION Vec3<double> row(Field const& f, int i) {
+  return {double(f(i, 0)), double(f(i, 1)), double(f(i, 2))};
+}
+
+/// Writes gradient and curvature of the local terms; swept terms are added to them.
+template <class S, class Precision, class Kernel, int curvature_numbers, class CurvatureField>
+struct LocalGradient {
+  using Real = typename Precision::real;
+  Kernel kernel;
+  FixedMask<S> fixed;
+  Array<Real, S> mass;
+  VectorField<typename Precision::position, S> x;
+  VectorField<Real, S> g;
+  CurvatureField curvature;
+
+  KOKKOS_FUNCTION void operator()(int i) const {
+    Vec3<double> const xi = row(x, i);
+    Vec3<double> const gi = fixed(i) ? Vec3<double>{} : kernel.gradient(i, xi);
+    for (int c = 0; c < 3; ++c) g(i, c) = static_cast<Real>(gi[c]);
+    if constexpr (curvature_numbers > 0) {
+      double const m = double(mass(i));
+      Sym3<double> const h = fixed(i) ? Sym3<double>{{m, m, m, 0, 0, 0}} : kernel.curvature(i, xi);
+      for (int c = 0; c < curvature_numbers; ++c) curvature(i, c) = static_cast<Real>(h.s[c]);
+    }
+  }
+};
+
+template <class S, class Precision, class Kernel>
+struct LocalValue {
+  Kernel kernel;
+  VectorField<typename Precision::position, S> x;
+  KOKKOS_FUNCTION void operator()(int i, Sums<typename Precision::sum, 1>& sum) const {
+    sum[0] += static_cast<typename Precision::sum>(kernel.value(i, row(x, i)));
+  }
+};
+
+/// E(x + alpha p) - E(x), or E(x) - E(x - alpha p) if `arrived`.
+template <class S, class Precision, class Kernel>
+struct LocalChange {
+  Kernel kernel;
+  FixedMask<S> fixed;
+  VectorField<typename Precision::position, S> x;
+  VectorField<typename Precision::real, S> p;
+  double alpha;
+  bool arrived;
+  KOKKOS_FUNCTION void operator()(int i, Sums<typename Precision::sum, 1>& sum) const {
+    if (fixed(i)) return;
+    Vec3<double> const s = alpha * row(p, i);
+    Vec3<double> const from = arrived ? row(x, i) - s : row(x, i);
+    sum[0] += static_cast<typename Precision::sum>(kernel.change(i, from, s));
+  }
+};
+
+template <class S, class Precision, class Kernel>
+struct LocalForm {
+  Kernel kernel;
+  FixedMask<S> fixed;
+  VectorField<typename Precision::position, S> x;
+  VectorField<typename Precision::real, S> p;
+  KOKKOS_FUNCTION void operator()(int i, Sums<typename Precision::sum, 1>& sum) const {
+    if (fixed(i)) return;
+    sum[0] +=
+        static_cast<typename Precision::sum>(quadratic(kernel.curvature(i, row(x, i)), row(p, i)));
+  }
+};
+
+template <class S, class Precision, class Kernel>
+struct LocalProduct {
+  Kernel kernel;
+  FixedMask<S> fixed;
+  VectorField<typename Precision::position, S> x;
+  VectorField<typename Precision::real, S> p, hp;
+  KOKKOS_FUNCTION void operator()(int i) const {
+    Vec3<double> const y = fixed(i) ? Vec3<double>{} : kernel.curvature(i, row(x, i)) * row(p, i);
+    for (int c = 0; c < 3; ++c) hp(i, c) = static_cast<typename Precision::real>(y[c]);
+  }
+};
+
+/// Sets the diagonal blocks to the local curvature (to the mass where fixed), all others to zero.
+template <class S, class Precision, class Kernel>
+struct LocalAssemble {
+  Kernel kernel;
+  FixedMask<S> fixed;
+  Array<typename Precision::real, S> mass;
+  VectorField<typename Precision::position, S> x;
+  BlockCsr<S, double> matrix;
+  KOKKOS_FUNCTION void operator()(int i) const {
+    for (int k = matrix.row_begin(i); k < matrix.row_begin(i + 1); ++k) {
+      matrix.block(k) = 0.0 * identity3<double>();
+    }
+    double const m = double(mass(i));
+    Sym3<double> const h =
+        fixed(i) ? Sym3<double>{{m, m, m, 0, 0, 0}} : kernel.curvature(i, row(x, i));
+    matrix.add(i, i, to_matrix(h));
+  }
+};
+
+/// p = prescribed - x at fixed unknowns, zero elsewhere; raises the largest component.
+template <class S, class Precision>
+struct PrescribedDirection {
+  FixedMask<S> fixed;
+  VectorField<typename Precision::position, S> x, prescribed;
+  VectorField<typename Precision::real, S> p;
+  KOKKOS_FUNCTION void operator()(int i, double& largest) const {
+    for (int c = 0; c < 3; ++c) {
+      double const d = fixed(i) ? double(prescribed(i, c)) - double(x(i, c)) : 0;
+      p(i, c) = static_cast<typename Precision::real>(d);
+      largest = Kokkos::max(largest, Kokkos::abs(d));
+    }
+  }
+};
+
+template <class S, class Precision>
+struct MovePrescribed {
+  FixedMask<S> fixed;
+  VectorField<typename Precision::position, S> x, prescribed;
+  double fraction;
+  KOKKOS_FUNCTION void operator()(int i) const {
+    if (!fixed(i)) return;
+    for (int c = 0; c < 3; ++c) {
+      // The last step lands exactly.
+      x(i, c) =
+          fraction >= 1
+              ? prescribed(i, c)
+              : static_cast<typename Precision::position>(
+                    double(x(i, c)) + fraction * (double(prescribed(i, c)) - double(x(i, c))));
+    }
+  }
+};
+
+/// Moves free unknowns to the minimum of the local terms, where these have one.
+template <class S, class Precision, class Kernel>
+struct Predict {
+  Kernel kernel;
+  FixedMask<S> fixed;
+  VectorField<typename Precision::position, S> x;
+  KOKKOS_FUNCTION void operator()(int i) const {
+    if (fixed(i)) return;
+    Vec3<double> const xi = row(x, i);
+    Mat3<double> const h = to_matrix(kernel.curvature(i, xi));
+    double const det = determinant(h);
+    if (!(det > 0)) return;
+    Vec3<double> const step = (1 / det) * (cofactor(h) * kernel.gradient(i, xi));
+    for (int c = 0; c < 3; ++c) {
+      x(i, c) = static_cast<typename Precision::position>(xi[c] - step[c]);
+    }
+  }
+};
+
+template <class S, class Precision>
+struct FreeMass {
+  FixedMask<S> fixed;
+  Array<typename Precision::real, S> mass;
+  KOKKOS_FUNCTION void operator()(int i, Sums<double, 1>& sum) const {
+    if (!fixed(i)) sum[0] += double(mass(i));
+  }
+};
+
+}  // namespace kernels
+
+template <class... Terms>
+class Potential {
+  using First = std::tuple_element_t<0, std::tuple<Terms...>>;
+
+public:
+  using Space = typename First::Space;
+  using Precision = typename First::Precision;
+  using Real = typename Precision::real;
+  using Positions = VectorField<typename Precision::position, Space>;
+  using Vectors = VectorField<Real, Space>;
+  using Blocks = BlockField<Real, Space>;
+  using Matrix = BlockCsr<Space, double>;
+
+  static_assert((std::same_as<typename Terms::Space, Space> && ...),
+                "taut: all terms of a Potential must live in the same Space");
+  static_assert((std::same_as<typename Terms::Precision, Precision> && ...),
+                "taut: all terms of a Potential must have the same Precision");
+  static_assert(((LocalTerm<Terms> || SweptTerm<Terms>)&&...),
+                "taut: each term of a Potential must satisfy LocalTerm or SweptTerm "
+                "(core/potential/term.hpp)");
+
+  explicit Potential(Unknowns<Precision, Space> const& unknowns, Terms... terms)
+      : unknowns_(unknowns),
+        terms_(std::move(terms)...),
+        direction_("prescribed_direction", unknowns.size()),
+        reducer_(unknowns.size(), 1),
+        mass_reducer_(unknowns.size(), 1) {}
+
+  /// The time integrator says what the step is: the factor of all energies but the inertia (h^2 for
+  /// implicit Euler), and the step that turns errors of position into errors of velocity.
+  void begin_step(double scale, double time_step, bool has_inertia) {
+    scale_ = scale;
+    kernels::FreeMass<Space, Precision> const free_mass{unknowns_.fixed, unknowns_.mass};
+    double const mass = mass_reducer_.template sum<1>("free_mass", size(), free_mass)[0];
+    step_ = {mass, unknowns_.length, time_step, has_inertia};
+  }
+
+  template <class Term>
+  Term& term() {
+    return std::get<Term>(terms_);
+  }
+  Unknowns<Precision, Space> const& unknowns() const { return unknowns_; }
+
+  int size() const { return unknowns_.size(); }
+  Scale scale() const { return step_; }
+  Array<Real, Space> mass() const { return unknowns_.mass; }
+
+  double value(Positions const& x) const {
+    auto const local = locals();
+    using Kernel = kernels::LocalValue<Space, Precision, std::decay_t<decltype(local)>>;
+    double total = reducer_.template sum<1>("local_value", size(), Kernel{local, x})[0];
+    for_each_swept([&](auto const& term) { total += term.value(x, scale_); });
+    return total;
+  }
+
+  double difference(Positions const& x, Vectors const& p, double alpha) const {
+    double total = local_change(x, p, alpha, false);
+    for_each_swept([&](auto const& term) { total += term.change(x, p, alpha, scale_); });
+    return total;
+  }
+
+  void gradient(Positions const& x, Vectors const& g) const {
+    local_gradient<0>(x, g, g);
+    for_each_swept([&](auto const& term) { term.add_gradient(x, scale_, unknowns_.fixed, g); });
+  }
+  void gradient(Positions const& x, Vectors const& g, Vectors const& diagonal) const {
+    gradient_with<3>(x, g, diagonal);
+  }
+  void gradient(Positions const& x, Vectors const& g, Blocks const& blocks) const {
+    gradient_with<6>(x, g, blocks);
+  }
+
+  double gradient_after(Positions const& x, Vectors const& p, double alpha,
+                        Vectors const& g) const {
+    double total = local_change(x, p, alpha, true);
+    local_gradient<0>(x, g, g);
+    for_each_swept([&](auto const& term) {
+      total += term.add_gradient_after(x, p, alpha, scale_, unknowns_.fixed, g);
+    });
+    return total;
+  }
+  double gradient_after(Positions const& x, Vectors const& p, double alpha, Vectors const& g,
+                        Vectors const& diagonal) const {
+    return gradient_after_with<3>(x, p, alpha, g, diagonal);
+  }
+  double gradient_after(Positions const& x, Vectors const& p, double alpha, Vectors const& g,
+                        Blocks const& blocks) const {
+    return gradient_after_with<6>(x, p, alpha, g, blocks);
+  }
+
+  double quadratic_form(Positions const& x, Vectors const& p) const {
+    auto const local = locals();
+    using Kernel = kernels::LocalForm<Space, Precision, std::decay_t<decltype(local)>>;
+    double total =
+        reducer_.template sum<1>("local_form", size(), Kernel{local, unknowns_.fixed, x, p})[0];
+    for_each_swept([&](auto const& term) { total += term.quadratic_form(x, p, scale_); });
+    return total;
+  }
+
+  void product(Positions const& x, Vectors const& p, Vectors const& hp) const {
+    auto const local = locals();
+    using Kernel = kernels::LocalProduct<Space, Precision, std::decay_t<decltype(local)>>;
+    for_each<Space>("local_product", size(), Kernel{local, unknowns_.fixed, x, p, hp});
+    for_each_swept([&](auto const& term) { term.add_product(x, p, scale_, unknowns_.fixed, hp); });
+  }
+
+  Matrix pattern() const {
+    std::vector<std::vector<int>> lists;
+    std::vector<int> lengths;
+    for_each_swept([&](auto const& term) {
+      lists.emplace_back();
+      lengths.push_back(term.elements(lists.back()));
+    });
+    std::vector<Connectivity> kinds;
+    for (std::size_t k = 0; k < lists.size(); ++k) kinds.push_back({lists[k], lengths[k]});
+    return Matrix(pattern_from_elements(size(), kinds));
+  }
+
+  void assemble(Positions const& x, Matrix const& matrix) const {
+    auto const local = locals();
+    using Kernel = kernels::LocalAssemble<Space, Precision, std::decay_t<decltype(local)>>;
+    for_each<Space>("local_assemble", size(),
+                    Kernel{local, unknowns_.fixed, unknowns_.mass, x, matrix});
+    for_each_swept([&](auto const& term) { term.add_to(matrix, x, scale_, unknowns_.fixed); });
+  }
+
+  double max_step(Positions const& x, Vectors const& p) const {
+    double smallest = std::numeric_limits<double>::infinity();
+    for_each_swept(
+        [&](auto const& term) { smallest = Kokkos::min(smallest, term.max_step(x, p)); });
+    return smallest;
+  }
+
+  /// As `max_step`, for motion that is prescribed: no element may fold, whatever its material.
+  double max_prescribed_step(Positions const& x, Vectors const& p) const {
+    double smallest = std::numeric_limits<double>::infinity();
+    for_each_swept([&](auto const& term) {
+      smallest = Kokkos::min(smallest, term.max_prescribed_step(x, p));
+    });
+    return smallest;
+  }
+
+  /// Moves free unknowns by one Newton step on the local terms alone: from x + h v to the predictor
+  /// x + h v + h^2 (g + f / m). Without inertia nothing moves.
+  void predict(Positions const& x) const {
+    auto const local = locals();
+    using Kernel = kernels::Predict<Space, Precision, std::decay_t<decltype(local)>>;
+    for_each<Space>("predict", size(), Kernel{local, unknowns_.fixed, x});
+  }
+
+  /// Fixed unknowns go at most half of the way to where the first element would fold, then the free
+  /// ones follow (minimiser iterations), and so on until all have arrived.
+  bool advance_prescribed(Positions const& x) const {
+    using Direction = kernels::PrescribedDirection<Space, Precision>;
+    double const distance =
+        maximum<Space>("prescribed_direction", size(), 0.0,
+                       Direction{unknowns_.fixed, x, unknowns_.prescribed, direction_});
+    if (distance == 0) return false;
+    // Materials that tolerate inversion may have to fold (a push faster than sound): there the
+    // motion is not held up for ever.
+    double const allowed = 0.5 * max_step(x, direction_);
+    double const patience = distance < 1e-3 * unknowns_.length ? 1.0 : 0.125;
+    double const fraction = Kokkos::min(
+        1.0, Kokkos::max(0.5 * max_prescribed_step(x, direction_), Kokkos::min(patience, allowed)));
+    if (!(fraction * distance > 0)) {
+      throw Error(
+          "the prescribed motion folds an element that is already flat: reduce the motion per step "
+          "or release the pinned vertices around it");
+    }
+    for_each<Space>("move_prescribed", size(),
+                    kernels::MovePrescribed<Space, Precision>{unknowns_.fixed, x,
+                                                              unknowns_.prescribed, fraction});
+    return true;
+  }
+
+private:
+  /// The chained kernels of all local terms.
+  auto locals() const {
+    return std::apply(
+        [&](auto const&... term) {
+          return std::apply([](auto const&... kernel) { return kernels::chain(kernel...); },
+                            std::tuple_cat(local_kernel(term)...));
+        },
+        terms_);
+  }
+  template <class Term>
+  auto local_kernel(Term const& term) const {
+    if constexpr (LocalTerm<Term>) {
+      return std::make_tuple(term.kernel(scale_));
+    } else {
+      return std::tuple<>();
+    }
+  }
+
+  template <class Visit>
+  void for_each_swept(Visit const& visit) const {
+    std::apply([&](auto const&... term) { (visit_swept(term, visit), ...); }, terms_);
+  }
+  template <class Term, class Visit>
+  static void visit_swept(Term const& term, Visit const& visit) {
+    if constexpr (SweptTerm<Term>) visit(term);
+  }
+
+  template <int numbers, class CurvatureField>
+  void local_gradient(Positions const& x, Vectors const& g, CurvatureField const& c) const {
+    auto const local = locals();
+    using Kernel = kernels::LocalGradient<Space, Precision, std::decay_t<decltype(local)>, numbers,
+                                          CurvatureField>;
+    for_each<Space>("local_gradient", size(),
+                    Kernel{local, unknowns_.fixed, unknowns_.mass, x, g, c});
+  }
+  template <int numbers, class CurvatureField>
+  void gradient_with(Positions const& x, Vectors const& g, CurvatureField const& c) const {
+    local_gradient<numbers>(x, g, c);
+    for_each_swept([&](auto const& term) { term.add_gradient(x, scale_, unknowns_.fixed, g, c); });
+  }
+  template <int numbers, class CurvatureField>
+  double gradient_after_with(Positions const& x, Vectors const& p, double alpha, Vectors const& g,
+                             CurvatureField const& c) const {
+    double total = local_change(x, p, alpha, true);
+    local_gradient<numbers>(x, g, c);
+    for_each_swept([&](auto const& term) {
+      total += term.add_gradient_after(x, p, alpha, scale_, unknowns_.fixed, g, c);
+    });
+    return total;
+  }
+  double local_change(Positions const& x, Vectors const& p, double alpha, bool arrived) const {
+    auto const local = locals();
+    using Kernel = kernels::LocalChange<Space, Precision, std::decay_t<decltype(local)>>;
+    return reducer_.template sum<1>("local_change", size(),
+                                    Kernel{local, unknowns_.fixed, x, p, alpha, arrived})[0];
+  }
+
+  Unknowns<Precision, Space> unknowns_;
+  std::tuple<Terms...> terms_;
+  Vectors direction_;
+  Reducer<Space, typename Precision::sum> reducer_;
+  Reducer<Space, double> mass_reducer_;
+  double scale_ = 1;
+  Scale step_;
+};
+
+template <class Precision, class Space, class... Terms>
+Potential(Unknowns<Precision, Space> const&, Terms...) -> Potential<Terms...>;
+
+}  // namespace taut

@@ -1,0 +1,69 @@
+// The terms of an incremental potential E(x) = 1/2 |x - x~|^2_M + h^2 (V_1(x) + V_2(x) + ...).
+//
+// A term is of one of two kinds:
+//   - a *local* term is a function of one unknown at a time (inertia, body forces, springs to a
+//   place).
+//     It says what it is for one unknown; all local terms are evaluated together in one loop;
+//   - a *swept* term couples unknowns (elements, contacts). It runs sweeps of its own.
+// Each reports physical energies (J); the factor h^2 is handed in by the potential and applied
+// once.
+#pragma once
+
+#include <taut/core/exec/space.hpp>
+#include <taut/core/math/matrix.hpp>
+#include <taut/core/sparse/block_csr.hpp>
+
+#include <concepts>
+
+namespace taut {
+
+/// Which unknowns are fixed: 1 at those. Terms leave their rows alone.
+template <class S>
+using FixedMask = Kokkos::View<std::uint8_t*, typename S::memory>;
+
+/// A local term hands out a kernel for a given scale h^2. The kernel is copied to the device; for
+/// unknown i at x it gives (in fp64: positions are differences of large numbers)
+///   change(i, x, s)   E_i(x + s) - E_i(x), without cancellation
+///   value(i, x)       E_i(x)
+///   gradient(i, x)    3-vector
+///   curvature(i, x)   symmetric 3x3, positive semi-definite
+template <class Term>
+concept LocalTerm = requires(Term const& term, double scale, Vec3<double> const& x) {
+  typename Term::Space;
+  typename Term::Precision;
+  { term.kernel(scale).value(0, x) } -> std::convertible_to<double>;
+  { term.kernel(scale).change(0, x, x) } -> std::convertible_to<double>;
+  { term.kernel(scale).gradient(0, x) } -> std::same_as<Vec3<double>>;
+  { term.kernel(scale).curvature(0, x) } -> std::same_as<Sym3<double>>;
+};
+
+/// A swept term adds itself, times `scale` = h^2, to fields of the whole potential.
+template <class Term>
+concept SweptTerm = requires(
+    Term const& term, VectorField<typename Term::Precision::position, typename Term::Space> x,
+    VectorField<typename Term::Precision::real, typename Term::Space> p,
+    BlockField<typename Term::Precision::real, typename Term::Space> blocks,
+    BlockCsr<typename Term::Space, double> matrix, FixedMask<typename Term::Space> fixed,
+    double alpha, double scale, std::vector<int>& vertices) {
+  { term.value(x, scale) } -> std::convertible_to<double>;
+  /// E(x + alpha p) - E(x)
+  { term.change(x, p, alpha, scale) } -> std::convertible_to<double>;
+  {term.add_gradient(x, scale, fixed, p)};
+  {term.add_gradient(x, scale, fixed, p, p)};
+  {term.add_gradient(x, scale, fixed, p, blocks)};
+  /// The same after a step of alpha p that led to x; returns E(x) - E(x - alpha p).
+  { term.add_gradient_after(x, p, alpha, scale, fixed, p) } -> std::convertible_to<double>;
+  { term.add_gradient_after(x, p, alpha, scale, fixed, p, p) } -> std::convertible_to<double>;
+  { term.add_gradient_after(x, p, alpha, scale, fixed, p, blocks) } -> std::convertible_to<double>;
+  { term.quadratic_form(x, p, scale) } -> std::convertible_to<double>;
+  {term.add_product(x, p, scale, fixed, p)};
+  {term.add_to(matrix, x, scale, fixed)};
+  /// Largest valid step along p; infinity if nothing limits it.
+  { term.max_step(x, p) } -> std::convertible_to<double>;
+  /// The same as seen by prescribed motion, which may never fold the mesh (whatever the material).
+  { term.max_prescribed_step(x, p) } -> std::convertible_to<double>;
+  /// Vertex lists of equal length for the sparsity pattern: appends them and returns the length.
+  { term.elements(vertices) } -> std::convertible_to<int>;
+};
+
+}  // namespace taut

@@ -1,0 +1,312 @@
+// The loop that nonlinear CG, L-BFGS and Chebyshev's method share:
+//   p from the gradient, by a Direction;  alpha by a LineSearch;  x <- x + alpha p;  until a rule
+//   stops.
+//
+// It forgets the past (restarts from p = -P g) when p is no descent direction, when a bound has cut
+// the step (otherwise momentum keeps pushing what the bound has parked), when no step along p
+// lowers the energy, and when prescribed unknowns have moved.
+#pragma once
+
+#include <taut/integrators/line_search.hpp>
+#include <taut/integrators/preconditioner.hpp>
+#include <taut/integrators/report.hpp>
+#include <taut/integrators/stopping.hpp>
+
+#include <cmath>
+#include <utility>
+
+namespace taut {
+
+/// What a Direction says about the p that it has made.
+struct Heading {
+  double slope = 0;     ///< g'p
+  double descent = 0;   ///< g'P g, what the slope of -P g would be without its sign
+  double metric = 0;    ///< p'M p
+  double gradient = 0;  ///< g' M^-1 g
+  double beta = 0, gamma = 0;
+  double first_length = 0;  ///< step to try first; 0: that of the quadratic model
+  bool steepest = false;    ///< p = -P g: there is nothing to forget
+  bool lost = false;        ///< the past had to be forgotten (s'y <= 0)
+};
+
+/// The sequence of directions of a method. `next` makes fields.direction from fields.gradient at x
+/// and the step that led there; `renewed` says that the preconditioner is not the one of the last
+/// call.
+template <class D, class E, class M>
+concept Direction = requires(
+    D& direction, E& e, VectorField<typename E::Precision::position, typename E::Space> const& x,
+    DescentFields<typename E::Precision, typename E::Space>& fields, M const& preconditioner,
+    Step const& last, bool renewed) {
+  {direction.restart()};
+  { direction.next(e, x, fields, preconditioner, last, renewed) } -> std::same_as<Heading>;
+};
+
+/// When the preconditioner is due (see Refresh).
+class RefreshClock {
+public:
+  explicit RefreshClock(Refresh const& refresh) : refresh_(refresh) { make_due(); }
+  bool due() const { return age_ >= refresh_.interval; }
+  bool due_after_step() const { return age_ >= refresh_.interval - 1; }
+  void make_due() { age_ = refresh_.interval; }
+  void updated() { age_ = 0, longest_ = 0; }
+  void stepped(double length) {
+    ++age_;
+    longest_ = std::max(longest_, length);
+    if (length * refresh_.trigger < longest_) make_due();
+  }
+
+private:
+  Refresh refresh_;
+  int age_ = 0;
+  double longest_ = 0;
+};
+
+/// Restarts where promised. Off, every direction and every cut is taken as it comes (the paper).
+struct Safeguard {
+  bool on = true;
+  double least_descent = 1e-3;  ///< p descends if g'p <= -least_descent g'P g
+};
+
+/// One minimisation: holds what the loop needs to know between its parts.
+template <class E, class M, class D, class Search, class Rule>
+requires Objective<E> && Preconditioner<M, E> && Direction<D, E, M> && LineSearch<Search, E> &&
+    Stopping<Rule>
+class Descent {
+public:
+  using P = typename E::Precision;
+  using S = typename E::Space;
+  using Positions = VectorField<typename P::position, S>;
+
+  Descent(E& e, Positions const& x, DescentFields<P, S>& fields, M& preconditioner, D& direction,
+          Search const& search, Rule& rule, Budget const& budget, Safeguard const& safeguard,
+          Observer<P, S> const& observer)
+      : e_(e),
+        x_(x),
+        fields_(fields),
+        preconditioner_(preconditioner),
+        direction_(direction),
+        search_(search),
+        rule_(rule),
+        budget_(budget),
+        safeguard_(safeguard),
+        observer_(observer),
+        scale_(e.scale()),
+        clock_(preconditioner.refresh()) {}
+
+  MinimiserReport run() {
+    Kokkos::Timer const timer;
+    fields_.mass = e_.mass();
+    rule_.start(scale_);
+    direction_.start();
+    while (report_.stop == Stop::none) {
+      if (report_.iterations >= budget_.max_iterations) {
+        report_.stop = Stop::budget_iterations;
+      } else if (timer.seconds() >= budget_.max_seconds) {
+        report_.stop = Stop::budget_seconds;
+      } else {
+        iterate();
+      }
+    }
+    report_.error_estimate_m = rule_.error_estimate();
+    report_.error_estimate_mps = report_.error_estimate_m / scale_.time_step;
+    report_.seconds = timer.seconds();
+    return report_;
+  }
+
+private:
+  void iterate() {
+    bool const renewed = measure();
+    Heading const heading = aim(renewed);
+    report_.gradient_norm = std::sqrt(heading.gradient / scale_.mass);
+    if (!std::isfinite(heading.slope)) {
+      if (report_.iterations > 0) Kokkos::deep_copy(typename S::execution(), x_, fields_.from);
+      report_.stop = Stop::non_finite;
+    } else if (heading.descent == 0) {
+      if (advance_prescribed()) return;
+      rule_.check({.stuck = true});
+      report_.stop = Stop::converged_by_gradient;
+    } else {
+      step(heading);
+    }
+  }
+
+  /// Gradient and preconditioner at x, as far as they are not known; true if the latter is new.
+  bool measure() {
+    LocalMatrices<P, S> const& curvature = preconditioner_.curvature();
+    if (!step_.evaluated || (clock_.due() && !fresh_curvature_ && !curvature.empty())) {
+      if (clock_.due() && curvature.blocks.extent(0) > 0) {
+        e_.gradient(x_, fields_.gradient, curvature.blocks);
+      } else if (clock_.due() && curvature.diagonal.extent(0) > 0) {
+        e_.gradient(x_, fields_.gradient, curvature.diagonal);
+      } else {
+        e_.gradient(x_, fields_.gradient);
+      }
+    }
+    if (!clock_.due()) return false;
+    preconditioner_.update(e_, x_);
+    clock_.updated();
+    ++report_.refreshes;
+    return true;
+  }
+
+  Heading aim(bool renewed) {
+    Heading const heading = direction_.next(e_, x_, fields_, preconditioner_, step_, renewed);
+    report_.restarts.curvature += heading.lost;
+    bool const descends = heading.slope <= -safeguard_.least_descent * heading.descent;
+    if (!safeguard_.on || heading.steepest || descends) return heading;
+    ++report_.restarts.not_descent;
+    direction_.restart();
+    return direction_.next(e_, x_, fields_, preconditioner_, step_, false);
+  }
+
+  void step(Heading const& heading) {
+    // The gradient where the step ends is written over the one before the last step.
+    bool const curvature_due = clock_.due_after_step();
+    Line<E> line(e_, x_, fields_,
+                 curvature_due ? preconditioner_.curvature() : LocalMatrices<P, S>(), heading.slope,
+                 largest_decrement_);
+    if (!scale_.has_inertia) line.curvature();
+    step_ = search_(line, heading.first_length);
+    report_.backtracks += step_.backtracks;
+    report_.cuts += step_.cut;
+    if (!step_.found) return give_up(heading, line);
+
+    std::swap(fields_.gradient, fields_.gradient_before);
+    fresh_curvature_ = step_.evaluated && curvature_due;
+    clock_.stepped(step_.length);
+
+    double const decrement = -step_.energy_change;
+    double const attainable = 0.5 * std::abs(heading.slope * step_.aimed);
+    Progress const progress{.decrement = decrement,
+                            .attainable = step_.cut ? std::max(decrement, attainable) : decrement,
+                            .curvature = line.known_curvature() / heading.metric,
+                            .gradient_norm = report_.gradient_norm};
+    largest_decrement_ = std::max(largest_decrement_, decrement);
+    report_.energy_change += step_.energy_change;
+    Stop const stop = rule_.check(progress);
+    if (observer_) {
+      observer_({report_.iterations, x_, step_.length, heading.beta, heading.gamma, heading.slope,
+                 line.known_curvature(), step_.energy_change, report_.energy_change,
+                 report_.gradient_norm, rule_.error_estimate()});
+    }
+    ++report_.iterations;
+    if (safeguard_.on && step_.cut) {
+      ++report_.restarts.cut;
+      direction_.restart();
+    }
+    if (!advance_prescribed()) report_.stop = stop != Stop::none ? stop : check_progress();
+  }
+
+  /// Stalled if the energy is where it was `patience` steps ago: all that is left is round-off,
+  /// which the line search lets pass.
+  Stop check_progress() {
+    constexpr int patience = 32;
+    if (report_.iterations % patience != 0) return Stop::none;
+    bool const fell = report_.energy_change < marked_energy_;
+    marked_energy_ = report_.energy_change;
+    return fell ? Stop::none : Stop::stalled;
+  }
+
+  /// No step along p was good enough. Along -P g that is the end, unless prescribed unknowns are
+  /// still to move: converged if even what the step promised is too little to count.
+  void give_up(Heading const& heading, Line<E>& line) {
+    step_.evaluated = false;
+    if (clock_.due_after_step()) clock_.make_due();  // trials have overwritten P with curvature
+    if (!heading.steepest) {
+      ++report_.restarts.armijo;
+      direction_.restart();
+    } else if (!advance_prescribed()) {
+      double const promised = 0.5 * std::abs(heading.slope * line.newton_length());
+      report_.stop = rule_.check({.decrement = promised,
+                                  .attainable = promised,
+                                  .curvature = line.known_curvature() / heading.metric,
+                                  .gradient_norm = report_.gradient_norm,
+                                  .stuck = true});
+      if (!std::isfinite(step_.energy_change)) report_.stop = Stop::non_finite;
+      if (report_.stop == Stop::none) report_.stop = Stop::stalled;
+    }
+  }
+
+  bool advance_prescribed() {
+    if (prescribed_left_) prescribed_left_ = e_.advance_prescribed(x_);
+    if (!prescribed_left_) return false;
+    ++report_.restarts.prescribed;
+    direction_.restart();
+    rule_.forget();
+    step_.evaluated = false;
+    return true;
+  }
+
+  E& e_;
+  Positions const& x_;
+  DescentFields<P, S>& fields_;
+  M& preconditioner_;
+  D& direction_;
+  Search const& search_;
+  Rule& rule_;
+  Budget const& budget_;
+  Safeguard const& safeguard_;
+  Observer<P, S> const& observer_;
+  Scale const scale_;
+
+  RefreshClock clock_;
+  Step step_;                     ///< the last one
+  bool fresh_curvature_ = false;  ///< preconditioner's curvature() was filled at x
+  bool prescribed_left_ = true;
+  double largest_decrement_ = 0;
+  double marked_energy_ = 0;  ///< energy change up to the last check of progress
+  MinimiserReport report_;
+};
+
+/// A method of descent as a minimiser: directions, policies and the memory that they work on.
+template <class Directions, class Preconditioner_, class LineSearch_, class Stopping_,
+          class Params_>
+class DescentMinimiser {
+  static_assert(
+      Stopping<Stopping_>,
+      "taut: a minimiser's stopping rule must satisfy Stopping (integrators/stopping.hpp)");
+
+public:
+  using Precision = typename Directions::Precision;
+  using Space = typename Directions::Space;
+  using Positions = VectorField<typename Precision::position, Space>;
+  using Params = Params_;
+
+  DescentMinimiser() : DescentMinimiser(Params()) {}
+  explicit DescentMinimiser(Params const& params)
+      : params_(params),
+        directions_(params),
+        preconditioner_(params.preconditioner),
+        line_search_(params.line_search),
+        stopping_(params.stop) {}
+
+  /// Minimises e from x, in place. Allocates if the number of unknowns has changed, and never in an
+  /// iteration.
+  template <Objective E>
+  MinimiserReport minimise(E& e, Positions const& x,
+                           Observer<Precision, Space> const& observer = {}) {
+    static_assert(
+        std::same_as<typename E::Precision, Precision> && std::same_as<typename E::Space, Space>,
+        "taut: a minimiser and its objective must have the same Precision and Space");
+    if (fields_.size() != e.size()) {
+      fields_.resize(e.size());
+      preconditioner_.resize(e.size());
+      directions_.resize(e.size(), preconditioner_.pointwise());
+    }
+    return Descent(e, x, fields_, preconditioner_, directions_, line_search_, stopping_,
+                   params_.budget, params_.safeguard, observer)
+        .run();
+  }
+
+  Params const& params() const { return params_; }
+
+private:
+  Params params_;
+  DescentFields<Precision, Space> fields_;
+  Directions directions_;
+  Preconditioner_ preconditioner_;
+  LineSearch_ line_search_;
+  Stopping_ stopping_;
+};
+
+}  // namespace taut

@@ -1,0 +1,51 @@
+// A sparse direct solver as the linear solver of a minimiser: exact and serial, for small scenes
+// and as an oracle.
+#pragma once
+
+#include <taut/core/sparse/direct_solver.hpp>
+#include <taut/integrators/linear_solver.hpp>
+
+#include <vector>
+
+namespace taut {
+
+template <class P = Mixed, class S = DefaultSpace>
+class Direct {
+public:
+  using Vectors = VectorField<typename P::real, S>;
+
+  struct Params {};
+  explicit Direct(Params const& = {}) {}
+
+  template <class E>
+  void start(E& e) {
+    matrix_ = e.pattern();
+    host_ = typename Vectors::HostMirror("direct_host", e.size());
+    numbers_.resize(3 * std::size_t(e.size()));
+  }
+
+  /// Exact whatever the tolerance. Fails (p is then not written) where H is not positive definite.
+  template <class E, class M>
+  LinearReport solve(E& e, VectorField<typename P::position, S> const& x, Vectors const& b,
+                     M const&, double, Vectors const& p) {
+    e.assemble(x, matrix_);
+    if (solver_.factorize(matrix_) != Definiteness::positive) return {};
+    int const n = static_cast<int>(b.extent(0));
+    Kokkos::deep_copy(host_, b);
+    for (int i = 0; i < n; ++i)
+      for (int c = 0; c < 3; ++c) numbers_[3 * i + c] = double(host_(i, c));
+    solver_.solve(numbers_, numbers_);
+    for (int i = 0; i < n; ++i)
+      for (int c = 0; c < 3; ++c) host_(i, c) = typename P::real(numbers_[3 * i + c]);
+    Kokkos::deep_copy(p, host_);
+    return {.stop = LinearStop::converged, .iterations = 1, .residual = 0};
+  }
+
+private:
+  BlockCsr<S, double> matrix_;
+  typename Vectors::HostMirror host_;
+  std::vector<double> numbers_;
+  DirectSolver solver_;
+};
+
+}  // namespace taut

@@ -1,0 +1,79 @@
+// The fields of a minimiser and the passes over them. No pass depends on a policy, so each is
+// compiled once per precision and space. Products are formed and summed in Precision::sum.
+#pragma once
+
+#include <taut/core/exec/parallel.hpp>
+#include <taut/core/math/matrix.hpp>
+
+namespace taut {
+namespace kernels {
+
+template <class T, class Field>
+KOKKOS_FORCEINLINE_FUNCTION Vec3<T> load3(Field const& field, int i) {
+  return {T(field(i, 0)), T(field(i, 1)), T(field(i, 2))};
+}
+template <class T, class U>
+KOKKOS_FORCEINLINE_FUNCTION Vec3<T> convert(Vec3<U> const& a) {
+  return {T(a[0]), T(a[1]), T(a[2])};
+}
+template <class T, class Field>
+KOKKOS_FORCEINLINE_FUNCTION void store3(Field const& field, int i, Vec3<T> const& value) {
+  using Stored = typename Field::non_const_value_type;
+  for (int c = 0; c < 3; ++c) field(i, c) = Stored(value[c]);
+}
+
+/// x = from + alpha p, and first from = x if `leaving`.
+template <class P, class S>
+struct MoveAlong {
+  VectorField<typename P::position, S> x, from;
+  VectorField<typename P::real, S> p;
+  typename P::position alpha;
+  bool leaving;
+  KOKKOS_FUNCTION void operator()(int i) const {
+    for (int c = 0; c < 3; ++c) {
+      if (leaving) from(i, c) = x(i, c);
+      x(i, c) = from(i, c) + alpha * typename P::position(p(i, c));
+    }
+  }
+};
+
+template <class P, class S>
+struct Dot {
+  VectorField<typename P::real, S> a, b;
+  KOKKOS_FUNCTION void operator()(int i, Sums<typename P::sum, 1>& sums) const {
+    using Sum = typename P::sum;
+    sums[0] += dot(load3<Sum>(a, i), load3<Sum>(b, i));
+  }
+};
+
+template <class P, class S>
+struct LargestNorm {
+  VectorField<typename P::real, S> p;
+  KOKKOS_FUNCTION void operator()(int i, double& largest) const {
+    largest = Kokkos::max(largest, norm(load3<double>(p, i)));
+  }
+};
+
+}  // namespace kernels
+
+/// What an iteration works on. Allocated by `resize` alone.
+template <class P, class S>
+struct DescentFields {
+  using Vectors = VectorField<typename P::real, S>;
+  Vectors gradient, gradient_before;          ///< at x, and where the last step began
+  Vectors direction;                          ///< p
+  VectorField<typename P::position, S> from;  ///< where the last step began
+  Array<typename P::real, S> mass;
+  Reducer<S, typename P::sum> reducer;
+
+  int size() const { return static_cast<int>(direction.extent(0)); }
+  void resize(int n) {
+    gradient = Vectors("gradient", n);
+    gradient_before = Vectors("gradient_before", n);
+    direction = Vectors("direction", n);
+    from = VectorField<typename P::position, S>("from", n);
+    reducer = Reducer<S, typename P::sum>(n);
+  }
+};
+
+}  // namespace taut

@@ -1,0 +1,254 @@
+// How far to go along a direction. A line search moves x and says what it did; every step is kept
+// within a fraction of Objective::max_step, where that is finite.
+#pragma once
+
+#include <taut/core/potential/objective.hpp>
+#include <taut/integrators/preconditioner.hpp>
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+namespace taut {
+
+/// What a line search did.
+struct Step {
+  double aimed = 0;          ///< the length tried first, but for bounds
+  double length = 0;         ///< alpha; x has moved by alpha p
+  double energy_change = 0;  ///< kg m^2; predicted by the quadratic model unless `evaluated`
+  bool evaluated = false;    ///< the gradient where the step ends is known
+  double bound = std::numeric_limits<double>::infinity();  ///< the longest length allowed
+  bool cut = false;                                        ///< the bound made the step shorter
+  bool found = true;   ///< false: no step was good enough, x is where it was
+  int backtracks = 0;  ///< steps tried and refused
+};
+
+/// The half line from + alpha p, as line searches see it. `slope` is g'p at its beginning.
+template <class E>
+class Line {
+public:
+  using P = typename E::Precision;
+  using S = typename E::Space;
+  using Positions = VectorField<typename P::position, S>;
+  using Vectors = VectorField<typename P::real, S>;
+
+  /// Gradients at trial points, and where wanted the curvature, are written into
+  /// fields.gradient_before and `curvature`; `energy_unit` is the size of energy changes so far.
+  Line(E& objective, Positions const& x, DescentFields<P, S> const& fields,
+       LocalMatrices<P, S> const& curvature, double slope, double energy_unit)
+      : objective_(objective),
+        x_(x),
+        fields_(fields),
+        curvature_(curvature),
+        slope_(slope),
+        energy_unit_(energy_unit) {}
+
+  double slope() const { return slope_; }
+  /// p'Hp at the beginning; asked for once, before the first move. NaN until then.
+  double curvature() {
+    if (std::isnan(form_)) form_ = objective_.quadratic_form(x_, fields_.direction);
+    return form_;
+  }
+  double known_curvature() const { return form_; }
+  /// The step of the quadratic model, -g'p / p'Hp; infinity where no curvature is left along p.
+  double newton_length() {
+    return curvature() > 0 ? -slope_ / curvature() : std::numeric_limits<double>::infinity();
+  }
+  /// max_i |p_i|
+  double largest_norm() const {
+    return maximum<S>("largest_norm", objective_.size(), 0.0,
+                      kernels::LargestNorm<P, S>{fields_.direction});
+  }
+  /// `lengths` in metres where there is no inertia, otherwise infinity.
+  double reach(double lengths) const {
+    Scale const scale = objective_.scale();
+    return scale.has_inertia ? std::numeric_limits<double>::infinity() : lengths * scale.length;
+  }
+  /// Largest step that is valid; to be asked for before the first move.
+  double max_length() { return objective_.max_step(x_, fields_.direction); }
+
+  /// x = from + alpha p
+  void move(double alpha) {
+    for_each<S>("move_along", objective_.size(),
+                kernels::MoveAlong<P, S>{x_, fields_.from, fields_.direction,
+                                         typename P::position(alpha), !moved_});
+    moved_ = true;
+    length_ = alpha;
+  }
+  /// Back to where the line begins, exactly.
+  void retreat() {
+    if (moved_) Kokkos::deep_copy(typename S::execution(), x_, fields_.from);
+  }
+  /// Evaluates the gradient at x; the energy difference to the beginning.
+  double evaluate() {
+    if (curvature_.blocks.extent(0) > 0)
+      return objective_.gradient_after(x_, fields_.direction, length_, fields_.gradient_before,
+                                       curvature_.blocks);
+    if (curvature_.diagonal.extent(0) > 0)
+      return objective_.gradient_after(x_, fields_.direction, length_, fields_.gradient_before,
+                                       curvature_.diagonal);
+    return objective_.gradient_after(x_, fields_.direction, length_, fields_.gradient_before);
+  }
+  /// g'p of the gradient evaluated last.
+  double slope_here() const {
+    kernels::Dot<P, S> const dot{fields_.gradient_before, fields_.direction};
+    return double(fields_.reducer.template sum<1>("slope", objective_.size(), dot)[0]);
+  }
+  /// Energy differences below this are round-off.
+  double round_off() {
+    double const unit = std::max(energy_unit_, std::abs(slope_ * length_));
+    return 16 * double(Kokkos::Experimental::epsilon_v<typename P::real>) * unit;
+  }
+
+private:
+  E& objective_;
+  Positions const& x_;
+  DescentFields<P, S> const& fields_;
+  LocalMatrices<P, S> const curvature_;
+  double slope_, energy_unit_;
+  double form_ = std::numeric_limits<double>::quiet_NaN();
+  double length_ = 0;
+  bool moved_ = false;
+};
+
+/// `search(line, first)`: `first` is the length to try first, or 0 for that of the quadratic model.
+template <class L, class E>
+concept LineSearch = requires(L const& search, Line<E>& line, double first) {
+  typename L::Params;
+  {L(typename L::Params())};
+  { search(line, first) } -> std::same_as<Step>;
+};
+
+/// How steps are kept valid and sane.
+struct StepBound {
+  double fraction = 0.5;  ///< of the largest valid step; infinity: do not ask for it
+  double max_displacement = std::numeric_limits<double>::infinity();  ///< of any unknown, m
+  double reach = 10;  ///< the same in Scale::length where curvature may vanish (no inertia)
+
+  /// The step to try first: `first`, or if that is 0 the one of the quadratic model, within bounds.
+  template <class E>
+  Step first_step(Line<E>& line, double first) const {
+    Step step{.aimed = first > 0 ? first : line.newton_length()};
+    if (std::isfinite(fraction)) step.bound = fraction * line.max_length();
+    double const displacement = std::min(max_displacement, line.reach(reach));
+    if (std::isfinite(displacement))
+      step.bound = std::min(step.bound, displacement / line.largest_norm());
+    step.cut = step.aimed > step.bound;
+    step.length = std::min(step.aimed, step.bound);
+    step.found = step.length != 0;
+    return step;
+  }
+};
+
+/// The paper's: alpha = -g'p / p'Hp, one pass, no check.
+class NewtonStep {
+public:
+  struct Params {
+    StepBound bound;
+  };
+  NewtonStep() : NewtonStep(Params()) {}
+  explicit NewtonStep(Params const& params) : params_(params) {}
+
+  template <class E>
+  Step operator()(Line<E>& line, double first) const {
+    Step step = params_.bound.first_step(line, first);
+    if (!step.found) return step;
+    step.energy_change =
+        step.length * line.slope() + 0.5 * step.length * step.length * line.curvature();
+    line.move(step.length);
+    return step;
+  }
+
+private:
+  Params params_;
+};
+
+/// The same, but a step must lower the energy by a fraction of what its slope promises (Armijo);
+/// otherwise it is shortened by interpolation. The energy difference comes with the gradient that
+/// the next iteration needs anyway, so that the check is free while steps are good.
+class SufficientDecrease {
+public:
+  struct Params {
+    StepBound bound;
+    double armijo = 1e-4;  ///< fraction of the promised decrease
+    int max_backtracks = 6;
+  };
+  SufficientDecrease() : SufficientDecrease(Params()) {}
+  explicit SufficientDecrease(Params const& params) : params_(params) {}
+
+  template <class E>
+  Step operator()(Line<E>& line, double first) const {
+    Step step = params_.bound.first_step(line, first);
+    if (!step.found) return step;
+    step.evaluated = true;
+    for (;; ++step.backtracks) {
+      line.move(step.length);
+      step.energy_change = line.evaluate();
+      double const promised = step.length * line.slope();
+      if (step.energy_change <= params_.armijo * promised + line.round_off()) return step;
+      if (step.backtracks == params_.max_backtracks) break;
+      // Minimum of the parabola through the slope and both energies.
+      double const shrink = -0.5 * promised / (step.energy_change - promised);
+      step.length *= std::isfinite(shrink) ? std::clamp(shrink, 0.1, 0.5) : 0.1;
+    }
+    line.retreat();
+    step.found = false;
+    return step;
+  }
+
+private:
+  Params params_;
+};
+
+/// The first minimum along the line, to a tight tolerance: for tests and oracles.
+class ExactLineSearch {
+public:
+  struct Params {
+    StepBound bound;
+    double tolerance = 1e-10;  ///< of |slope| over that at the beginning
+    int max_evaluations = 100;
+  };
+  ExactLineSearch() : ExactLineSearch(Params()) {}
+  explicit ExactLineSearch(Params const& params) : params_(params) {}
+
+  /// Doubles the step until the slope has changed its sign, then secant steps (regula falsi with
+  /// Illinois weights). A slope that is not a number lies beyond a barrier.
+  template <class E>
+  Step operator()(Line<E>& line, double first) const {
+    Step step = params_.bound.first_step(line, first);
+    if (!step.found) return step;
+    step.evaluated = true;
+    double low = 0, low_slope = line.slope(), high = 0, high_slope = 0, bound = step.bound;
+    int side = 0;
+    for (int k = 0; k < params_.max_evaluations; ++k) {
+      line.move(step.length);
+      step.energy_change = line.evaluate();
+      double const slope = line.slope_here();
+      step.cut = step.length >= bound && slope < 0;
+      if (step.cut || std::abs(slope) <= params_.tolerance * -line.slope()) break;
+      if (slope < 0) {
+        low = step.length;
+        low_slope = slope;
+        if (side < 0) high_slope /= 2;
+        side = -1;
+      } else {
+        high = step.length;
+        high_slope = std::isfinite(slope) ? slope : -low_slope;
+        if (side > 0) low_slope /= 2;
+        side = 1;
+      }
+      double const next = high > 0 ? low - low_slope * (high - low) / (high_slope - low_slope)
+                                   : std::min(2 * step.length, bound);
+      if (next == low || next == high) break;
+      step.length = next;
+    }
+    step.found = step.energy_change <= line.round_off();
+    if (!step.found) line.retreat();
+    return step;
+  }
+
+private:
+  Params params_;
+};
+
+}  // namespace taut

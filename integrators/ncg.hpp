@@ -1,0 +1,191 @@
+// Preconditioned nonlinear conjugate gradients (Algorithm 1 of the PNCG paper):
+//   p = -P g + beta p + gamma P y,   x <- x + alpha p,
+// with any beta, preconditioner, line search and stopping rule. Two passes over the unknowns per
+// iteration: one for all scalar products, one for the direction.
+#pragma once
+
+#include <taut/integrators/beta.hpp>
+#include <taut/integrators/descent.hpp>
+
+namespace taut {
+namespace kernels {
+
+/// z = P g and w = P y, computed in passing or read from memory.
+template <class P, class S>
+struct PreconditionedGradient {
+  using Real = typename P::real;
+  using Vectors = VectorField<Real, S>;
+  Vectors gradient, gradient_before;
+  LocalMatrices<P, S> local;
+  Vectors z, z_before;  ///< P g and P (g before), if P is not pointwise
+
+  KOKKOS_FUNCTION Vec3<Real> change(int i) const {
+    return load3<Real>(gradient, i) - load3<Real>(gradient_before, i);
+  }
+  KOKKOS_FUNCTION Vec3<Real> of_gradient(int i) const {
+    return z.extent(0) > 0 ? load3<Real>(z, i) : local.product(i, load3<Real>(gradient, i));
+  }
+  KOKKOS_FUNCTION Vec3<Real> of_change(int i) const {
+    return z.extent(0) > 0 ? load3<Real>(z, i) - load3<Real>(z_before, i)
+                           : local.product(i, change(i));
+  }
+};
+
+/// All scalar products of an iteration, between p of the last step and both gradients.
+template <class P, class S>
+struct ConjugateDots {
+  enum { g_P_g, g_P_y, y_P_y, before_P_before, g_p, y_p, g_g, g_Minv_g, count };
+  PreconditionedGradient<P, S> preconditioned;
+  VectorField<typename P::real, S> p;
+  Array<typename P::real, S> mass;
+
+  KOKKOS_FUNCTION void operator()(int i, Sums<typename P::sum, count>& sums) const {
+    using Sum = typename P::sum;
+    auto const g = load3<Sum>(preconditioned.gradient, i);
+    auto const y = convert<Sum>(preconditioned.change(i));
+    auto const z = convert<Sum>(preconditioned.of_gradient(i));
+    auto const w = convert<Sum>(preconditioned.of_change(i));
+    auto const last = load3<Sum>(p, i);
+    Sum const gg = dot(g, g);
+    sums[g_P_g] += dot(g, z);
+    sums[g_P_y] += dot(g, w);
+    sums[y_P_y] += dot(y, w);
+    sums[before_P_before] += dot(g - y, z - w);
+    sums[g_p] += dot(g, last);
+    sums[y_p] += dot(y, last);
+    sums[g_g] += gg;
+    if (gg > 0) sums[g_Minv_g] += gg / Sum(mass(i));
+  }
+};
+
+/// p = -z + beta p + gamma w, and its products with the gradient and itself.
+template <class P, class S>
+struct ConjugateDirection {
+  enum { g_p, p_p, p_M_p, count };
+  PreconditionedGradient<P, S> preconditioned;
+  VectorField<typename P::real, S> p;
+  Array<typename P::real, S> mass;
+  typename P::real beta, gamma;
+
+  KOKKOS_FUNCTION void operator()(int i, Sums<typename P::sum, count>& sums) const {
+    using Sum = typename P::sum;
+    Vec3<typename P::real> next = -preconditioned.of_gradient(i);
+    if (beta != 0) next = next + beta * load3<typename P::real>(p, i);
+    if (gamma != 0) next = next + gamma * preconditioned.of_change(i);
+    store3(p, i, next);
+    auto const wide = convert<Sum>(next);
+    Sum const pp = dot(wide, wide);
+    sums[g_p] += dot(load3<Sum>(preconditioned.gradient, i), wide);
+    sums[p_p] += pp;
+    sums[p_M_p] += Sum(mass(i)) * pp;
+  }
+};
+
+}  // namespace kernels
+
+/// The directions of nonlinear CG.
+template <class B, class P, class S>
+class ConjugateDirections {
+  static_assert(Beta<B>, "taut: Ncg's first argument must satisfy Beta (integrators/beta.hpp)");
+
+public:
+  using Precision = P;
+  using Space = S;
+  using Vectors = VectorField<typename P::real, S>;
+
+  /// Without safeguard, s'y <= 0 is left to the formula.
+  template <class Params>
+  explicit ConjugateDirections(Params const& params)
+      : beta_(params.beta), safeguard_(params.safeguard.on) {}
+
+  /// Memory for P g, unless P is pointwise.
+  void resize(int n, bool pointwise) {
+    z_ = Vectors("z", pointwise ? 0 : n);
+    z_before_ = Vectors("z_before", pointwise ? 0 : n);
+  }
+
+  void start() { restart(); }
+  void restart() { restarted_ = true; }
+
+  template <class E, class M>
+  Heading next(E&, VectorField<typename P::position, S> const&, DescentFields<P, S>& fields,
+               M const& preconditioner, Step const& last, bool renewed) {
+    kernels::PreconditionedGradient<P, S> preconditioned{
+        fields.gradient, fields.gradient_before, preconditioner.curvature(), {}, {}};
+    if (!preconditioner.pointwise()) {
+      std::swap(z_, z_before_);
+      preconditioner.apply(fields.gradient, z_);
+      if (renewed && !restarted_) preconditioner.apply(fields.gradient_before, z_before_);
+      preconditioned.z = z_;
+      preconditioned.z_before = z_before_;
+    }
+
+    using Dot = kernels::ConjugateDots<P, S>;
+    auto const sums = fields.reducer.template sum<Dot::count>(
+        "conjugate_dots", fields.size(), Dot{preconditioned, fields.direction, fields.mass});
+    dots_.g_P_g = dots_.g1_P1_g1;
+    dots_.g_g = dots_.g1_g1;
+    dots_.g1_P1_g1 = double(sums[Dot::g_P_g]);
+    dots_.g1_P1_y = double(sums[Dot::g_P_y]);
+    dots_.y_P1_y = double(sums[Dot::y_P_y]);
+    dots_.g_P1_g = double(sums[Dot::before_P_before]);
+    dots_.g1_p = double(sums[Dot::g_p]);
+    dots_.y_p = double(sums[Dot::y_p]);
+    dots_.g1_g1 = double(sums[Dot::g_g]);
+    dots_.alpha = last.length;
+
+    Heading heading;
+    Coefficients kept;
+    if (!restarted_) {
+      kept = beta_(dots_);
+      bool const finite = std::isfinite(kept.beta) && std::isfinite(kept.gamma);
+      heading.lost = safeguard_ && (dots_.y_p <= 0 || !finite);
+      if (heading.lost) kept = {};
+    }
+    restarted_ = false;
+    heading.beta = kept.beta;
+    heading.gamma = kept.gamma;
+    heading.steepest = kept.beta == 0 && kept.gamma == 0;
+    heading.descent = dots_.g1_P1_g1;
+    heading.gradient = double(sums[Dot::g_Minv_g]);
+
+    using Update = kernels::ConjugateDirection<P, S>;
+    auto const products = fields.reducer.template sum<Update::count>(
+        "conjugate_direction", fields.size(),
+        Update{preconditioned, fields.direction, fields.mass, typename P::real(kept.beta),
+               typename P::real(kept.gamma)});
+    dots_.g_p = heading.slope = double(products[Update::g_p]);
+    dots_.p_p = double(products[Update::p_p]);
+    heading.metric = double(products[Update::p_M_p]);
+    return heading;
+  }
+
+private:
+  B beta_;
+  bool safeguard_;
+  bool restarted_ = true;
+  Dots dots_;
+  Vectors z_, z_before_;
+};
+
+template <class Beta, class Preconditioner, class LineSearch, class Stopping>
+struct NcgComposition {
+  Beta beta = {};
+  typename Preconditioner::Params preconditioner = {};
+  typename LineSearch::Params line_search = {};
+  typename Stopping::Params stop = {};
+  Budget budget = {};
+  Safeguard safeguard = {};
+};
+
+/// For example Ncg<DaiKou, BlockJacobi>, whose Params are {.beta = .., .preconditioner = .., and so
+/// on}.
+template <class Beta, template <class...> class Preconditioner,
+          class LineSearch = SufficientDecrease, class Stopping = DecrementWindow,
+          class Precision = Mixed, class Space = DefaultSpace>
+using Ncg =
+    DescentMinimiser<ConjugateDirections<Beta, Precision, Space>, Preconditioner<Precision, Space>,
+                     LineSearch, Stopping,
+                     NcgComposition<Beta, Preconditioner<Precision, Space>, LineSearch, Stopping>>;
+
+}  // namespace taut

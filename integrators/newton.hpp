@@ -1,0 +1,263 @@
+// Projected Newton: p = -H(x)^-1 g with H the positive semi-definite Hessian of the objective,
+// solved inexactly (Dembo, Eisenstat and Steihaug 1982), and a line search from alpha = 1. Near a
+// minimum where nothing is projected the error squares in each step; with an exact enough solve it
+// ends at round-off, which makes it the reference that other methods are measured against.
+#pragma once
+
+#include <taut/integrators/descent.hpp>
+#include <taut/integrators/linear_solver.hpp>
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+namespace taut {
+
+/// How exactly a Newton direction is asked for: to a relative residual of
+///   eta_k = gamma (|g_k| / |g_k-1|)^exponent,
+/// but not below gamma eta_k-1^exponent while that exceeds 0.1 (Eisenstat and Walker 1996, choice
+/// 2). Loose far from the minimum, and tight enough near it to keep the order of convergence.
+class ForcingTerm {
+public:
+  struct Params {
+    double largest = 0.1;  ///< and the first one; the only one if `fixed`
+    double least = 1e-8;
+    double gamma = 0.9;
+    double exponent = 2;
+    bool fixed = false;
+  };
+  explicit ForcingTerm(Params const& params) : params_(params) {}
+
+  void restart() { norm_before_ = 0; }
+  double operator()(double norm) {
+    double eta = params_.largest;
+    if (norm_before_ > 0 && !params_.fixed) {
+      eta = params_.gamma * std::pow(norm / norm_before_, params_.exponent);
+      double const safeguard = params_.gamma * std::pow(eta_before_, params_.exponent);
+      if (safeguard > 0.1) eta = std::max(eta, safeguard);
+      eta = std::clamp(eta, params_.least, params_.largest);
+    }
+    norm_before_ = norm;
+    eta_before_ = eta;
+    return eta;
+  }
+
+private:
+  Params params_;
+  double norm_before_ = 0, eta_before_ = 0;
+};
+
+namespace kernels {
+
+/// g' M^-1 g and b = -g.
+template <class P, class S>
+struct NewtonRightHandSide {
+  VectorField<typename P::real, S> g, b;
+  Array<typename P::real, S> mass;
+  KOKKOS_FUNCTION void operator()(int i, Sums<double, 1>& sums) const {
+    double square = 0;
+    for (int c = 0; c < 3; ++c) {
+      b(i, c) = -g(i, c);
+      square += double(g(i, c)) * double(g(i, c));
+    }
+    if (square != 0) sums[0] += square / double(mass(i));
+  }
+};
+
+/// g'p and p'M p.
+template <class P, class S>
+struct NewtonProducts {
+  enum { slope, metric, count };
+  VectorField<typename P::real, S> g, p;
+  Array<typename P::real, S> mass;
+  KOKKOS_FUNCTION void operator()(int i, Sums<double, count>& sums) const {
+    for (int c = 0; c < 3; ++c) {
+      sums[slope] += double(g(i, c)) * double(p(i, c));
+      sums[metric] += double(mass(i)) * double(p(i, c)) * double(p(i, c));
+    }
+  }
+};
+
+}  // namespace kernels
+
+/// A stopping rule that also stops where round-off does: the decrement is tiny (against the largest
+/// so far, or against the mass moved by a length) and has not halved for some steps.
+template <Stopping Rule, class Real>
+class UntilRoundOff : public Rule {
+public:
+  using Rule::Rule;
+
+  void start(Scale const& scale) {
+    Rule::start(scale);
+    largest_ = 0.5 * scale.mass * scale.length * scale.length;
+    forget();
+  }
+  void forget() {
+    Rule::forget();
+    smallest_ = std::numeric_limits<double>::infinity();
+    idle_steps_ = 0;
+  }
+  Stop check(Progress const& progress) {
+    double const decrement = std::abs(progress.attainable);
+    bool const idle = decrement > 0.5 * smallest_ && decrement < epsilon * largest_;
+    idle_steps_ = idle ? idle_steps_ + 1 : 0;
+    smallest_ = std::min(smallest_, decrement);
+    largest_ = std::max(largest_, decrement);
+    Stop const stop = Rule::check(progress);
+    return stop == Stop::none && idle_steps_ == 3 ? Stop::stalled : stop;
+  }
+
+private:
+  static constexpr double epsilon = double(Kokkos::Experimental::epsilon_v<Real>);
+  double smallest_ = 0, largest_ = 0;
+  int idle_steps_ = 0;
+};
+
+struct NewtonReport : MinimiserReport {
+  int linear_iterations = 0;  ///< products with the Hessian, in all steps
+  int linear_failures = 0;    ///< steps along -P g, because the linear solver had found no descent
+};
+
+/// The directions of Newton's method.
+template <class Linear, class P, class S>
+class NewtonDirections {
+public:
+  NewtonDirections(typename Linear::Params const& linear, ForcingTerm::Params const& forcing)
+      : linear_(linear), forcing_(forcing) {}
+
+  void resize(int n) {
+    b_ = VectorField<typename P::real, S>("newton_rhs", n);
+    reducer_ = Reducer<S>(n, Products::count);
+  }
+
+  /// A new minimisation, perhaps of another objective.
+  void start() {
+    started_ = false;
+    linear_iterations_ = linear_failures_ = 0;
+    restart();
+  }
+  void restart() { forcing_.restart(); }
+
+  template <class E, class M>
+  Heading next(E& e, VectorField<typename P::position, S> const& x, DescentFields<P, S>& fields,
+               M const& preconditioner, Step const&, bool) {
+    if (!started_) linear_.start(e);
+    started_ = true;
+    // There is no past in a Newton direction, so nothing else could be tried where it fails.
+    Heading heading{.first_length = 1, .steepest = true};
+    auto const& p = fields.direction;
+    using RightHandSide = kernels::NewtonRightHandSide<P, S>;
+    heading.gradient = reducer_.template sum<1>("newton_rhs", e.size(),
+                                                RightHandSide{fields.gradient, b_, fields.mass})[0];
+
+    double const tolerance = forcing_(std::sqrt(heading.gradient));
+    LinearReport const linear = linear_.solve(e, x, b_, preconditioner, tolerance, p);
+    linear_iterations_ += linear.iterations;
+    auto sums = products(fields);
+    if (linear.stop == LinearStop::failed || sums[Products::slope] > 0) {
+      ++linear_failures_;
+      preconditioner.apply(b_, p);
+      sums = products(fields);
+    }
+    heading.slope = sums[Products::slope];
+    heading.metric = sums[Products::metric];
+    heading.descent = -heading.slope;
+    return heading;
+  }
+
+  int linear_iterations() const { return linear_iterations_; }
+  int linear_failures() const { return linear_failures_; }
+
+private:
+  using Products = kernels::NewtonProducts<P, S>;
+
+  Sums<double, Products::count> products(DescentFields<P, S> const& fields) const {
+    return reducer_.template sum<Products::count>(
+        "newton_products", fields.size(), Products{fields.gradient, fields.direction, fields.mass});
+  }
+
+  Linear linear_;
+  ForcingTerm forcing_;
+  VectorField<typename P::real, S> b_;  ///< -g
+  Reducer<S> reducer_;
+  bool started_ = false;
+  int linear_iterations_ = 0, linear_failures_ = 0;
+};
+
+/// For example Newton<AssembledPcg, BlockJacobi>.
+template <template <class...> class LinearSolver_ = AssembledPcg,
+          template <class...> class Preconditioner_ = BlockJacobi,
+          class LineSearch_ = SufficientDecrease, Stopping Stopping_ = DecrementWindow,
+          class Precision_ = Mixed, class Space_ = DefaultSpace>
+class Newton {
+public:
+  using Precision = Precision_;
+  using Space = Space_;
+  using Linear = LinearSolver_<Precision, Space>;
+  using Preconditioner = Preconditioner_<Precision, Space>;
+  using Positions = VectorField<typename Precision::position, Space>;
+
+  struct Params {
+    typename Linear::Params linear = {};
+    ForcingTerm::Params forcing = {};
+    typename Preconditioner::Params preconditioner = {};
+    typename LineSearch_::Params line_search = many_backtracks();
+    typename Stopping_::Params stop = one_step_window();
+    Budget budget = {};
+    Safeguard safeguard = {};
+  };
+
+  Newton() : Newton(Params()) {}
+  explicit Newton(Params const& params)
+      : params_(params),
+        directions_(params.linear, params.forcing),
+        preconditioner_(params.preconditioner),
+        line_search_(params.line_search),
+        stopping_(params.stop) {}
+
+  /// Minimises e from x, in place.
+  template <Objective E>
+  NewtonReport minimise(E& e, Positions const& x, Observer<Precision, Space> const& observer = {}) {
+    static_assert(
+        std::same_as<typename E::Precision, Precision> && std::same_as<typename E::Space, Space>,
+        "taut: a minimiser and its objective must have the same Precision and Space");
+    static_assert(LinearSolver<Linear, E, Preconditioner>,
+                  "taut: Newton's first argument must satisfy LinearSolver (linear_solver.hpp)");
+    if (fields_.size() != e.size()) {
+      fields_.resize(e.size());
+      preconditioner_.resize(e.size());
+      directions_.resize(e.size());
+    }
+    NewtonReport report{Descent(e, x, fields_, preconditioner_, directions_, line_search_,
+                                stopping_, params_.budget, params_.safeguard, observer)
+                            .run()};
+    report.linear_iterations = directions_.linear_iterations();
+    report.linear_failures = directions_.linear_failures();
+    return report;
+  }
+
+  Params const& params() const { return params_; }
+
+private:
+  /// A Newton step is worth far more than the evaluations that it takes to shorten it.
+  static typename LineSearch_::Params many_backtracks() {
+    typename LineSearch_::Params params;
+    if constexpr (requires { params.max_backtracks; }) params.max_backtracks = 30;
+    return params;
+  }
+  /// What the next steps gain is far less than what the last one did: no need to wait for more.
+  static typename Stopping_::Params one_step_window() {
+    typename Stopping_::Params params;
+    if constexpr (requires { params.window; }) params.window = 1;
+    return params;
+  }
+
+  Params params_;
+  DescentFields<Precision, Space> fields_;
+  NewtonDirections<Linear, Precision, Space> directions_;
+  Preconditioner preconditioner_;
+  LineSearch_ line_search_;
+  UntilRoundOff<Stopping_, typename Precision::real> stopping_;
+};
+
+}  // namespace taut

@@ -1,0 +1,219 @@
+// Time integrators: each step is one minimisation of an incremental potential
+//   E(x) = 1/2 |x - x~|^2_M + c h^2 V(x),
+// where the rule says x~, c and the new velocity:
+//
+//   implicit Euler  x~ = x + h v                                 c = 1    v+ = (x+ - x) / h
+//   BDF2            x~ = (4 x - x-)/3 + 2h/9 (4 v - v-)          c = 4/9  v+ = (3 x+ - 4 x + x-) /
+//   2h quasi-static    no inertia                                   c = 1    v+ = 0
+//
+// Body forces are part of V. The minimisation starts from the predictor, the minimum of all terms
+// but the swept ones (x + h v + h^2 g for implicit Euler); vertices and pins go there together, as
+// far as no element of a pinned body folds, and the minimiser carries what is left of the pins'
+// motion through its iterations.
+#pragma once
+
+#include <taut/core/exec/parallel.hpp>
+#include <taut/core/potential/local_terms.hpp>
+#include <taut/core/potential/objective.hpp>
+#include <taut/integrators/report.hpp>
+
+#include <cmath>
+
+namespace taut {
+
+/// Position and velocity of all unknowns, now and one step ago. Owned by the user; a step
+/// overwrites it. Everything that a restarted run needs.
+template <class Precision = Mixed, class Space = DefaultSpace>
+struct State {
+  using Positions = VectorField<typename Precision::position, Space>;
+
+  Positions x, v;            ///< m, m/s
+  Positions x_last, v_last;  ///< at the step before (multistep rules)
+  double time = 0;           ///< s
+  int steps = 0;             ///< taken so far
+
+  State() = default;
+  explicit State(int n) : x("x", n), v("v", n), x_last("x_last", n), v_last("v_last", n) {}
+  /// At rest at these positions.
+  explicit State(Positions const& at) : State(static_cast<int>(at.extent(0))) {
+    Kokkos::deep_copy(x, at);
+  }
+  int size() const { return static_cast<int>(x.extent(0)); }
+};
+
+struct ImplicitEulerRule {
+  static constexpr char const* name = "implicit_euler";
+  static constexpr bool inertia = true;
+  static constexpr bool multistep = false;
+  /// x~ = a0 x + a1 x- + h (b0 v + b1 v-);  v+ = (c x+ + c0 x + c1 x-) / h;  scale h^2.
+  static constexpr double a0 = 1, a1 = 0, b0 = 1, b1 = 0, c = 1, c0 = -1, c1 = 0, scale = 1;
+};
+
+/// Second order; its first step is one of implicit Euler.
+struct Bdf2Rule {
+  static constexpr char const* name = "bdf2";
+  static constexpr bool inertia = true;
+  static constexpr bool multistep = true;
+  static constexpr double a0 = 4. / 3, a1 = -1. / 3, b0 = 8. / 9, b1 = -2. / 9, c = 1.5, c0 = -2,
+                          c1 = 0.5, scale = 4. / 9;
+};
+
+struct QuasiStaticRule {
+  static constexpr char const* name = "quasi_static";
+  static constexpr bool inertia = false;
+  static constexpr bool multistep = false;
+  static constexpr double a0 = 1, a1 = 0, b0 = 0, b1 = 0, c = 0, c0 = 0, c1 = 0, scale = 1;
+};
+
+namespace kernels {
+
+template <class Precision, class Space>
+struct InertialTarget {
+  using Position = typename Precision::position;
+  using Positions = VectorField<Position, Space>;
+  State<Precision, Space> state;
+  Positions target, x;
+  double a0, a1, hb0, hb1;
+  KOKKOS_FUNCTION void operator()(int i) const {
+    for (int c = 0; c < 3; ++c) {
+      double t = a0 * double(state.x(i, c)) + hb0 * double(state.v(i, c));
+      if (a1 != 0) t += a1 * double(state.x_last(i, c)) + hb1 * double(state.v_last(i, c));
+      target(i, c) = static_cast<Position>(t);
+      x(i, c) = target(i, c);
+    }
+  }
+};
+
+/// Direction from the state to the predictor; pins go to where they are to be.
+template <class Precision, class Space>
+struct StartDirection {
+  using Real = typename Precision::real;
+  FixedMask<Space> fixed;
+  VectorField<typename Precision::position, Space> from, predictor, prescribed;
+  VectorField<Real, Space> direction;
+  KOKKOS_FUNCTION void operator()(int i, double& prescribed_motion) const {
+    for (int c = 0; c < 3; ++c) {
+      double const to = fixed(i) ? double(prescribed(i, c)) : double(predictor(i, c));
+      double const d = to - double(from(i, c));
+      direction(i, c) = static_cast<Real>(d);
+      if (fixed(i)) prescribed_motion = Kokkos::max(prescribed_motion, Kokkos::abs(d));
+    }
+  }
+};
+
+template <class Precision, class Space>
+struct Start {
+  using Position = typename Precision::position;
+  FixedMask<Space> fixed;
+  VectorField<Position, Space> from, prescribed, x;  ///< x holds the predictor
+  double fraction;
+  KOKKOS_FUNCTION void operator()(int i) const {
+    for (int c = 0; c < 3; ++c) {
+      double const to = fixed(i) ? double(prescribed(i, c)) : double(x(i, c));
+      x(i, c) =
+          fraction >= 1
+              ? static_cast<Position>(to)
+              : static_cast<Position>(double(from(i, c)) + fraction * (to - double(from(i, c))));
+    }
+  }
+};
+
+template <class Precision, class Space>
+struct FinishStep {
+  using Position = typename Precision::position;
+  State<Precision, Space> state;
+  VectorField<Position, Space> x;
+  double c_h, c0_h, c1_h;
+  KOKKOS_FUNCTION void operator()(int i) const {
+    for (int c = 0; c < 3; ++c) {
+      double v = c_h * double(x(i, c)) + c0_h * double(state.x(i, c));
+      if (c1_h != 0) v += c1_h * double(state.x_last(i, c));
+      state.x_last(i, c) = state.x(i, c);
+      state.v_last(i, c) = state.v(i, c);
+      state.x(i, c) = x(i, c);
+      state.v(i, c) = static_cast<Position>(v);
+    }
+  }
+};
+
+}  // namespace kernels
+
+template <class Rule, class Minimiser>
+class TimeStepper {
+public:
+  using Precision = typename Minimiser::Precision;
+  using Space = typename Minimiser::Space;
+  using Positions = VectorField<typename Precision::position, Space>;
+  using Params = typename Minimiser::Params;
+
+  TimeStepper() = default;
+  explicit TimeStepper(Params const& params) : minimiser_(params) {}
+
+  /// Advances the state by h seconds. Pins go to potential.unknowns().prescribed, which the caller
+  /// has set for the end of the step. The state is left as it was if the step throws.
+  template <class Potential>
+  MinimiserReport step(Potential& potential, State<Precision, Space>& state, double h,
+                       Observer<Precision, Space> const& observer = {}) {
+    if (Rule::multistep && state.steps == 0) {
+      return advance<ImplicitEulerRule>(potential, state, h, observer);
+    }
+    return advance<Rule>(potential, state, h, observer);
+  }
+
+  Minimiser& minimiser() { return minimiser_; }
+
+private:
+  template <class R, class Potential>
+  MinimiserReport advance(Potential& potential, State<Precision, Space>& state, double h,
+                          Observer<Precision, Space> const& observer) {
+    int const n = state.size();
+    if (static_cast<int>(x_.extent(0)) != n) {
+      x_ = Positions("step_x", n);
+      direction_ = VectorField<typename Precision::real, Space>("step_direction", n);
+    }
+    potential.begin_step(R::scale * (R::inertia ? h * h : 1.0), h * std::sqrt(R::scale),
+                         R::inertia);
+    auto& inertia = potential.template term<Inertia<Precision, Space>>();
+    inertia.switch_on(R::inertia);
+    for_each<Space>("inertial_target", n,
+                    kernels::InertialTarget<Precision, Space>{state, inertia.target(), x_, R::a0,
+                                                              R::a1, h * R::b0, h * R::b1});
+    potential.predict(x_);
+    start(potential, state);
+    MinimiserReport const report = minimiser_.minimise(potential, x_, observer);
+    for_each<Space>(
+        "finish_step", n,
+        kernels::FinishStep<Precision, Space>{state, x_, R::c / h, R::c0 / h, R::c1 / h});
+    Kokkos::fence("taut: step");
+    state.time += h;
+    ++state.steps;
+    return report;
+  }
+
+  template <class Potential>
+  void start(Potential& potential, State<Precision, Space>& state) {
+    auto const& unknowns = potential.unknowns();
+    double const moved =
+        maximum<Space>("start_direction", state.size(), 0.0,
+                       kernels::StartDirection<Precision, Space>{unknowns.fixed, state.x, x_,
+                                                                 unknowns.prescribed, direction_});
+    double bound = potential.max_step(state.x, direction_);
+    if (moved > 0) bound = std::min(bound, potential.max_prescribed_step(state.x, direction_));
+    for_each<Space>("start", state.size(),
+                    kernels::Start<Precision, Space>{unknowns.fixed, state.x, unknowns.prescribed,
+                                                     x_, std::min(1.0, 0.5 * bound)});
+  }
+
+  Minimiser minimiser_;
+  Positions x_;
+  VectorField<typename Precision::real, Space> direction_;
+};
+
+template <class Minimiser>
+using ImplicitEuler = TimeStepper<ImplicitEulerRule, Minimiser>;
+template <class Minimiser>
+using Bdf2 = TimeStepper<Bdf2Rule, Minimiser>;
+template <class Minimiser>
+using QuasiStatic = TimeStepper<QuasiStaticRule, Minimiser>;
+
+}  // namespace taut

@@ -1,0 +1,126 @@
+// What is done about negative curvature, element by element. A filter turns a material's second
+// derivatives into the positive semi-definite ones that preconditioners and step lengths use; it
+// never touches energy or stress. Each filter gives
+//
+//   diagonal(s, b)   the three diagonal entries for a vertex with dF = u b^T
+//   block(s, b)      its symmetric 3x3 block
+//   quadratic(s, dF) dF : H : dF
+//
+// per unit volume; T may be a pack of elements.
+#pragma once
+
+#include <taut/core/math/psd_projection.hpp>
+#include <taut/materials/isotropic.hpp>
+#include <taut/materials/singular_frame.hpp>
+
+namespace taut {
+
+namespace kernels {
+template <class T>
+KOKKOS_FORCEINLINE_FUNCTION Vec3<T> clamped_diagonal(Sym3<T> const& h) {
+  return {max(h.s[0], T(0)), max(h.s[1], T(0)), max(h.s[2], T(0))};
+}
+}  // namespace kernels
+
+/// The paper's: each of the twelve diagonal entries and the scalar dF:H:dF are cut off at zero.
+struct ClampElement {
+  static constexpr char const* name = "clamp";
+
+  template <class Model, class T>
+  KOKKOS_FORCEINLINE_FUNCTION static Vec3<T> diagonal(IsotropicState<Model, T> const& s,
+                                                      Vec3<T> const& b) {
+    return kernels::clamped_diagonal(vertex_block<Model, true>(s, b));
+  }
+  template <class Model, class T>
+  KOKKOS_FORCEINLINE_FUNCTION static Sym3<T> block(IsotropicState<Model, T> const& s,
+                                                   Vec3<T> const& b) {
+    // Without I1 and with d33 >= 0 a vertex block is a sum of squares; only then skip the
+    // projection.
+    if constexpr (Model::use.d1) {
+      return project_psd(vertex_block<Model, false>(s, b));
+    } else {
+      IsotropicState<Model, T> positive = s;
+      positive.d.d33 = max(s.d.d33, T(0));
+      return vertex_block<Model, false>(positive, b);
+    }
+  }
+  template <class Model, class T>
+  KOKKOS_FORCEINLINE_FUNCTION static T quadratic(IsotropicState<Model, T> const& s,
+                                                 Mat3<T> const& dF) {
+    return max(quadratic_form<Model>(s, dF), T(0));
+  }
+};
+
+/// The public reference's "filter" variants, without its index error: the curvature of the
+/// rotation, lambda = 2 / (si + sj), is limited to 1 for all three pairs, and a negative volumetric
+/// term dPsi/dJ F:cof(dF) is dropped. What is left may still be negative for models outside ARAP
+/// and fixed corotated, so the element is clamped as well.
+struct LimitLambda {
+  static constexpr char const* name = "limit_lambda";
+
+  template <class Model, class T>
+  KOKKOS_FORCEINLINE_FUNCTION static Vec3<T> diagonal(IsotropicState<Model, T> const& s,
+                                                      Vec3<T> const& b) {
+    return kernels::clamped_diagonal(vertex_block<Model, true>(limited(s), b));
+  }
+  template <class Model, class T>
+  KOKKOS_FORCEINLINE_FUNCTION static Sym3<T> block(IsotropicState<Model, T> const& s,
+                                                   Vec3<T> const& b) {
+    return vertex_block<Model, false>(limited(s), b);
+  }
+  template <class Model, class T>
+  KOKKOS_FORCEINLINE_FUNCTION static T quadratic(IsotropicState<Model, T> const& s,
+                                                 Mat3<T> const& dF) {
+    IsotropicState<Model, T> l = limited(s);
+    if constexpr (Model::use.d3) {
+      l.d.d3 = select(l.d.d3 * contract(s.F, cofactor(dF)) < T(0), T(0), l.d.d3);
+    }
+    return max(quadratic_form<Model>(l, dF), T(0));
+  }
+
+private:
+  template <class Model, class T>
+  KOKKOS_FORCEINLINE_FUNCTION static IsotropicState<Model, T> limited(
+      IsotropicState<Model, T> const& s) {
+    IsotropicState<Model, T> l = s;
+    if constexpr (Model::use.d1) {
+      // lambda / 2 are the eigenvalues of G_inv. A negative one (si + sj < 0) becomes the limit
+      // too: it comes from a sum that passed through zero, where lambda grew without bound.
+      SymmetricEigen<T> e = symmetric_eigen(s.G_inv);
+      for (int k = 0; k < 3; ++k) {
+        e.values[k] = select(e.values[k] < T(0), T(0.5), min(e.values[k], T(0.5)));
+      }
+      l.G_inv = e.compose();
+    }
+    l.d.d33 = max(s.d.d33, T(0));
+    return l;
+  }
+};
+
+/// Exact projection: the negative eigenvalues of d2Psi/dF2 are set to zero (analytic eigensystem in
+/// the frame of the singular vectors, see singular_frame.hpp).
+struct FullProjection {
+  static constexpr char const* name = "projection";
+
+  template <class Model, class T>
+  KOKKOS_FORCEINLINE_FUNCTION static Vec3<T> diagonal(IsotropicState<Model, T> const& s,
+                                                      Vec3<T> const& b) {
+    Sym3<T> const h = block<Model>(s, b);
+    return {h.s[0], h.s[1], h.s[2]};
+  }
+  template <class Model, class T>
+  KOKKOS_FORCEINLINE_FUNCTION static Sym3<T> block(IsotropicState<Model, T> const& s,
+                                                   Vec3<T> const& b) {
+    SingularFrame<T> const frame = singular_frame<Model>(s);
+    Vec3<T> const beta = transpose_times(frame.V, b);
+    Mat3<T> const h = frame.vertex_pair(beta, beta);
+    return {{h(0, 0), h(1, 1), h(2, 2), h(0, 1), h(1, 2), h(0, 2)}};
+  }
+  template <class Model, class T>
+  KOKKOS_FORCEINLINE_FUNCTION static T quadratic(IsotropicState<Model, T> const& s,
+                                                 Mat3<T> const& dF) {
+    return contract(singular_frame<Model>(s).apply(dF), dF);
+  }
+};
+
+}  // namespace taut

@@ -1,0 +1,73 @@
+// A constitutive law as a discretisation takes it: an isotropic model together with a curvature
+// filter. Satisfies ElementMaterial of core/fem and serves tets and particles alike.
+//
+//   using Rubber = Elastic<StableNeoHookean>;                    // the paper's clamped curvature
+//   using Steel = Elastic<FixedCorotated, FullProjection>;
+#pragma once
+
+#include <taut/materials/curvature_filter.hpp>
+
+namespace taut {
+
+template <class Model_, class Filter_ = ClampElement>
+struct Elastic {
+  using Model = Model_;
+  using Filter = Filter_;
+  template <class T>
+  using Parameters = Lame<T>;
+  template <class T>
+  using State = IsotropicState<Model, T>;
+  template <class T>
+  using Frame = SingularFrame<T>;
+
+  static constexpr char const* name = Model::name;
+  static constexpr bool allows_inversion = Model::allows_inversion;
+
+  template <class T>
+  KOKKOS_FORCEINLINE_FUNCTION static Parameters<T> cast(Parameters<double> const& p) {
+    using V = ValueType<T>;
+    return {T(static_cast<V>(p.mu)), T(static_cast<V>(p.lambda))};
+  }
+
+  /// Psi(F), Pa.
+  template <class T>
+  KOKKOS_FORCEINLINE_FUNCTION static T energy(Lame<T> const& p, Mat3<T> const& F) {
+    return taut::energy<Model>(p, F);
+  }
+  template <class T>
+  KOKKOS_FORCEINLINE_FUNCTION static State<T> evaluate(Lame<T> const& p, Mat3<T> const& F) {
+    return taut::evaluate<Model>(p, F);
+  }
+  /// Psi(F) - Psi(F - dF) without cancellation.
+  template <class T>
+  KOKKOS_FORCEINLINE_FUNCTION static T change(Lame<T> const& p, State<T> const& s,
+                                              Mat3<T> const& dF) {
+    return energy_change<Model>(p, s, dF);
+  }
+  /// First Piola-Kirchhoff stress P(F), Pa.
+  template <class T>
+  KOKKOS_FORCEINLINE_FUNCTION static Mat3<T> stress(State<T> const& s) {
+    return taut::stress<Model>(s);
+  }
+  /// Filtered curvature of a vertex with dF = u b^T: diagonal and 3x3 block.
+  template <class T>
+  KOKKOS_FORCEINLINE_FUNCTION static Vec3<T> diagonal(State<T> const& s, Vec3<T> const& b) {
+    return Filter::template diagonal<Model>(s, b);
+  }
+  template <class T>
+  KOKKOS_FORCEINLINE_FUNCTION static Sym3<T> block(State<T> const& s, Vec3<T> const& b) {
+    return Filter::template block<Model>(s, b);
+  }
+  /// Filtered dF : H : dF.
+  template <class T>
+  KOKKOS_FORCEINLINE_FUNCTION static T quadratic(State<T> const& s, Mat3<T> const& dF) {
+    return Filter::template quadratic<Model>(s, dF);
+  }
+  /// The exactly projected second derivative; `apply(dF)` and `vertex_pair(V^T b_a, V^T b_b)`.
+  template <class T>
+  KOKKOS_FORCEINLINE_FUNCTION static Frame<T> frame(State<T> const& s) {
+    return singular_frame<Model>(s);
+  }
+};
+
+}  // namespace taut

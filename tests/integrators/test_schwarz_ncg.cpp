@@ -1,0 +1,63 @@
+// Additive Schwarz inside nonlinear CG: rebuilt rarely, without a restart.
+#include "toy_objectives.hpp"
+
+#include <taut/integrators/ncg.hpp>
+#include <taut/integrators/schwarz.hpp>
+
+#include <catch2/catch_test_macros.hpp>
+
+#include <atomic>
+
+namespace {
+
+using namespace taut;
+
+// The allocations of Kokkos; of the others, those of the coarse solve, it has none by construction.
+std::atomic<int> allocations = 0;
+void count_allocation(Kokkos_Profiling_SpaceHandle, char const*, void const*, std::uint64_t) {
+  ++allocations;
+}
+
+}  // namespace
+
+TEST_CASE("nonlinear CG needs fewer iterations with additive Schwarz") {
+  using Chain = toy::Chain<toy::Anisotropic, Fp64>;
+  Chain chain({.size = 600});
+  auto const x = chain.start(), y = chain.start();
+
+  Ncg<DaiKou, BlockJacobi, SufficientDecrease, DecrementWindow, Fp64> jacobi(
+      {.stop = {.tolerance = 1e-8}});
+  Ncg<DaiKou, Schwarz, SufficientDecrease, DecrementWindow, Fp64> schwarz(
+      {.stop = {.tolerance = 1e-8}});
+  auto const slow = jacobi.minimise(chain, x);
+  auto const fast = schwarz.minimise(chain, y);
+  CAPTURE(slow.iterations, fast.iterations, fast.refreshes);
+  CHECK(slow.converged());
+  CHECK(fast.converged());
+  CHECK(2 * fast.iterations < slow.iterations);
+  CHECK(fast.refreshes <= 1 + fast.iterations / 30);
+  CHECK(fast.restarts.total() <= 1);
+  double largest = 0;
+  for (int i = 0; i < chain.size(); ++i)
+    for (int c = 0; c < 3; ++c) largest = std::max(largest, std::abs(x(i, c) - y(i, c)));
+  CHECK(largest < 1e-6);
+}
+
+TEST_CASE("applying additive Schwarz allocates nothing") {
+  toy::Chain<toy::Anisotropic, Fp64> chain({.size = 600});
+  Schwarz<Fp64> schwarz;
+  schwarz.resize(chain.size());
+  schwarz.update(chain, chain.start());
+  REQUIRE(schwarz.has_coarse_level());
+  VectorField<double, DefaultSpace> const g("g", chain.size()), z("z", chain.size());
+  schwarz.apply(g, z);
+
+  allocations = 0;
+  Kokkos::Tools::Experimental::set_allocate_data_callback(count_allocation);
+  VectorField<double, DefaultSpace> const counted("counted", 1);
+  int const by_test = allocations;
+  schwarz.apply(g, z);
+  Kokkos::Tools::Experimental::set_allocate_data_callback(nullptr);
+  CHECK(by_test == 1);
+  CHECK(allocations == by_test);
+}

@@ -1,0 +1,267 @@
+// The result file: what is written is read back bitwise, and its layout is VTKHDF's.
+#include <fcntl.h>
+#include <hdf5.h>
+#include <sys/file.h>
+#include <unistd.h>
+
+#include <cstdint>
+#include <fstream>
+#include <io/io_samples.hpp>
+#include <taut/core/io/file.hpp>
+#include <taut/core/io/vtkhdf.hpp>
+
+using namespace taut;
+using namespace taut::test;
+
+namespace {
+
+ResultMesh sample() { return {two_tets(), {0, 1}, {"left & right", "größer"}}; }
+
+/// Positions or velocities of frame k of the sample: other numbers everywhere.
+std::vector<Point> frame(int k, double sign) {
+  std::vector<Point> points = two_tets().points;
+  for (std::size_t i = 0; i < points.size(); ++i) {
+    for (std::size_t a = 0; a < 3; ++a)
+      points[i][a] += sign * (k + 0.1 * double(i) + 0.01 * double(a));
+  }
+  return points;
+}
+
+void append_frames(ResultWriter& writer, int first, int end) {
+  for (int k = first; k < end; ++k) writer.append(k / 60.0, frame(k, 1), frame(k, -1));
+}
+
+void check_frames(std::filesystem::path const& path, int count) {
+  const ResultReader reader(path);
+  REQUIRE(reader.frames() == count);
+  REQUIRE(reader.times().size() == static_cast<std::size_t>(count));
+  for (int k = 0; k < count; ++k) {
+    CHECK(reader.times()[static_cast<std::size_t>(k)] == k / 60.0);
+    CHECK(reader.positions(k) == frame(k, 1));
+    CHECK(reader.velocities(k) == frame(k, -1));
+  }
+}
+
+std::vector<std::int64_t> integers(hid_t file, std::string const& name) {
+  const hid_t dataset = H5Dopen2(file, name.c_str(), H5P_DEFAULT);
+  REQUIRE(dataset >= 0);
+  const hid_t space = H5Dget_space(dataset);
+  std::vector<std::int64_t> values(static_cast<std::size_t>(H5Sget_simple_extent_npoints(space)));
+  CHECK(H5Dread(dataset, H5T_NATIVE_INT64, H5S_ALL, H5S_ALL, H5P_DEFAULT, values.data()) >= 0);
+  H5Sclose(space);
+  H5Dclose(dataset);
+  return values;
+}
+
+std::vector<std::int64_t> integer_attribute(hid_t file, std::string const& object,
+                                            char const* name) {
+  const hid_t attribute = H5Aopen_by_name(file, object.c_str(), name, H5P_DEFAULT, H5P_DEFAULT);
+  REQUIRE(attribute >= 0);
+  const hid_t space = H5Aget_space(attribute);
+  std::vector<std::int64_t> values(static_cast<std::size_t>(H5Sget_simple_extent_npoints(space)));
+  CHECK(H5Aread(attribute, H5T_NATIVE_INT64, values.data()) >= 0);
+  H5Sclose(space);
+  H5Aclose(attribute);
+  return values;
+}
+
+std::vector<hsize_t> shape(hid_t file, std::string const& name) {
+  const hid_t dataset = H5Dopen2(file, name.c_str(), H5P_DEFAULT);
+  REQUIRE(dataset >= 0);
+  const hid_t space = H5Dget_space(dataset);
+  std::vector<hsize_t> dims(static_cast<std::size_t>(H5Sget_simple_extent_ndims(space)));
+  H5Sget_simple_extent_dims(space, dims.data(), nullptr);
+  H5Sclose(space);
+  H5Dclose(dataset);
+  return dims;
+}
+
+}  // namespace
+
+TEST_CASE("frames, mesh and names are read back bitwise") {
+  const Folder folder;
+  const auto path = folder / "deep/er/result.vtkhdf";
+  auto writer = ResultWriter::create(path, sample(), 4, ResultWriter::IfExists::refuse);
+  check_frames(path, 0);
+  append_frames(writer, 0, 3);
+  CHECK(writer.frames() == 3);
+  check_frames(path, 3);  // while the writer lives
+  const ResultReader reader(path);
+  CHECK(reader.mesh().mesh.points == sample().mesh.points);
+  CHECK(reader.mesh().mesh.tets == sample().mesh.tets);
+  CHECK(reader.mesh().object == sample().object);
+  CHECK(reader.mesh().object_names == sample().object_names);
+  CHECK(reader.capacity() == 4);
+}
+
+TEST_CASE("a result without velocities says so") {
+  const Folder folder;
+  const auto path = folder / "result.vtkhdf";
+  auto writer = ResultWriter::create(path, sample(), 2, ResultWriter::IfExists::refuse, false);
+  writer.append(0, frame(0, 1), {});
+  const ResultReader reader(path);
+  CHECK_FALSE(reader.has_velocities());
+  CHECK(reader.positions(0) == frame(0, 1));
+  check_says(sentence([&] { reader.velocities(0); }), {path.string(), "without velocities"});
+}
+
+TEST_CASE("a result grows beyond the frames it was laid out for") {
+  const Folder folder;
+  const auto path = folder / "result.vtkhdf";
+  auto writer = ResultWriter::create(path, sample(), 2, ResultWriter::IfExists::refuse);
+  append_frames(writer, 0, 11);
+  check_frames(path, 11);
+  CHECK(ResultReader(path).capacity() == 16);
+  // Nothing but the result and its sidecar is left behind.
+  const auto entries = std::filesystem::directory_iterator(folder.path());
+  CHECK(std::distance(begin(entries), end(entries)) == 2);
+}
+
+TEST_CASE("a resumed result drops later frames and ends as an uninterrupted one") {
+  const Folder folder;
+  const auto path = folder / "result.vtkhdf";
+  {
+    auto writer = ResultWriter::create(path, sample(), 5, ResultWriter::IfExists::refuse);
+    append_frames(writer, 0, 5);
+  }
+  for (const std::int64_t capacity : {5, 9}) {
+    {
+      auto writer = ResultWriter::resume(path, sample(), 2, capacity);
+      CHECK(writer.frames() == 2);
+      check_frames(path, 2);
+      append_frames(writer, 2, 7);
+    }
+    check_frames(path, 7);
+  }
+}
+
+TEST_CASE("an existing result is never overwritten unasked") {
+  const Folder folder;
+  const auto path = folder / "result.vtkhdf";
+  {
+    auto writer = ResultWriter::create(path, sample(), 5, ResultWriter::IfExists::refuse);
+    append_frames(writer, 0, 2);
+  }
+  check_says(
+      sentence([&] { ResultWriter::create(path, sample(), 5, ResultWriter::IfExists::refuse); }),
+      {path.string(), "--force"});
+  check_frames(path, 2);
+  ResultWriter::create(path, sample(), 5, ResultWriter::IfExists::replace);
+  check_frames(path, 0);
+}
+
+TEST_CASE("equal runs leave equal files") {
+  const Folder folder;
+  for (char const* const name : {"a.vtkhdf", "b.vtkhdf"}) {
+    auto writer = ResultWriter::create(folder / name, sample(), 5, ResultWriter::IfExists::refuse);
+    append_frames(writer, 0, 4);
+  }
+  CHECK(read_file(folder / "a.vtkhdf") == read_file(folder / "b.vtkhdf"));
+}
+
+TEST_CASE("the layout is VTKHDF's: unstructured grid, static topology, steps") {
+  const Folder folder;
+  const auto path = folder / "result.vtkhdf";
+  const int capacity = 6;
+  {
+    auto writer = ResultWriter::create(path, sample(), capacity, ResultWriter::IfExists::refuse);
+    append_frames(writer, 0, 3);
+  }
+  const hid_t file = H5Fopen(path.c_str(), H5F_ACC_RDONLY, H5P_DEFAULT);
+  REQUIRE(file >= 0);
+  CHECK(integer_attribute(file, "VTKHDF", "Version") == std::vector<std::int64_t>{2, 0});
+  const hid_t type = H5Aopen_by_name(file, "VTKHDF", "Type", H5P_DEFAULT, H5P_DEFAULT);
+  const hid_t text = H5Aget_type(type);
+  CHECK(H5Tget_class(text) == H5T_STRING);
+  CHECK(H5Tis_variable_str(text) == 0);  // VTK insists on it
+  std::string name(H5Tget_size(text), '\0');
+  CHECK(H5Aread(type, text, name.data()) >= 0);
+  CHECK(name == "UnstructuredGrid");
+  H5Tclose(text);
+  H5Aclose(type);
+
+  using List = std::vector<std::int64_t>;
+  CHECK(integers(file, "VTKHDF/NumberOfPoints") == List{5});
+  CHECK(integers(file, "VTKHDF/NumberOfCells") == List{2});
+  CHECK(integers(file, "VTKHDF/NumberOfConnectivityIds") == List{8});
+  CHECK(integers(file, "VTKHDF/Connectivity") == List{0, 1, 2, 3, 0, 2, 1, 4});
+  CHECK(integers(file, "VTKHDF/Offsets") == List{0, 4, 8});
+  CHECK(integers(file, "VTKHDF/Types") == List{10, 10});
+  CHECK(integers(file, "VTKHDF/CellData/object") == List{0, 1});
+  CHECK(shape(file, "VTKHDF/Points") == std::vector<hsize_t>{5 * capacity, 3});
+  CHECK(shape(file, "VTKHDF/PointData/velocity") == std::vector<hsize_t>{5 * capacity, 3});
+
+  CHECK(integer_attribute(file, "VTKHDF/Steps", "NSteps") == List{3});
+  // Exactly as many times as steps: VTK copies them all into room for NSteps.
+  CHECK(shape(file, "VTKHDF/Steps/Values") == std::vector<hsize_t>{3});
+  const List rows{0, 5, 10, 15, 20, 25};
+  CHECK(integers(file, "VTKHDF/Steps/PointOffsets") == rows);
+  CHECK(integers(file, "VTKHDF/Steps/PointDataOffsets/velocity") == rows);
+  for (char const* const zero :
+       {"PartOffsets", "CellOffsets", "ConnectivityIdOffsets", "CellDataOffsets/object"}) {
+    CHECK(integers(file, std::string("VTKHDF/Steps/") + zero) == List(capacity, 0));
+  }
+  CHECK(shape(file, "VTKHDF/Steps/CellOffsets") == std::vector<hsize_t>{capacity, 1});
+  CHECK(integers(file, "VTKHDF/Steps/NumberOfParts") == List(capacity, 1));
+
+  // What a step commits is one write within one page: the header of /VTKHDF.
+  H5O_info_t info;
+  REQUIRE(H5Oget_info_by_name(file, "VTKHDF", &info, H5P_DEFAULT) >= 0);
+  CHECK(info.hdr.nchunks == 1);
+  CHECK(info.addr + info.hdr.space.total <= 4096);
+  H5Fclose(file);
+}
+
+TEST_CASE("the sidecar names every finished frame's rows") {
+  const Folder folder;
+  auto writer =
+      ResultWriter::create(folder / "a&b.vtkhdf", sample(), 3, ResultWriter::IfExists::refuse);
+  append_frames(writer, 0, 2);
+  const std::string xml = read_file(folder / "a&b.xdmf");
+  check_says(xml, {"<Grid Name=\"frame 0\"><Time Value=\"0\"/>", "<Grid Name=\"frame 1\">",
+                   "Format=\"XML\">5 0 1 1 5 3<", "Dimensions=\"15 3\"",
+                   "a&amp;b.vtkhdf:/VTKHDF/PointData/velocity", "</Xdmf>"});
+  CHECK(xml.find("frame 2") == std::string::npos);
+}
+
+TEST_CASE("a viewer that holds the file open does not stop the run") {
+  const Folder folder;
+  const auto path = folder / "result.vtkhdf";
+  auto writer = ResultWriter::create(path, sample(), 3, ResultWriter::IfExists::refuse);
+  const int viewer = ::open(path.c_str(), O_RDONLY);
+  REQUIRE(::flock(viewer, LOCK_SH | LOCK_NB) == 0);  // as HDF5 takes it to read
+  append_frames(writer, 0, 2);
+  writer = ResultWriter::resume(path, sample(), 1, 3);
+  append_frames(writer, 1, 3);
+  ::close(viewer);
+  check_frames(path, 3);
+}
+
+TEST_CASE("what is no result, or not this one, is refused with a sentence") {
+  const Folder folder;
+  const auto path = folder / "result.vtkhdf";
+  check_says(sentence([&] { ResultReader reader(path); }), {path.string(), "looked for"});
+  write_file_atomically(path, "no HDF5");
+  check_says(sentence([&] { ResultReader reader(path); }), {path.string(), "no result"});
+  check_says(sentence([&] { ResultWriter::resume(path, sample(), 0, 2); }), {"no result"});
+
+  auto writer = ResultWriter::create(path, sample(), 2, ResultWriter::IfExists::replace);
+  append_frames(writer, 0, 2);
+  std::vector<Point> few(3);
+  check_says(sentence([&] { writer.append(1, few, few); }), {"3 positions", "5"});
+  check_says(sentence([&] { ResultReader(path).positions(2); }), {"no frame 2", "has 2"});
+  check_says(sentence([&] { ResultReader(path).positions(-1); }), {"no frame -1"});
+  check_says(sentence([&] { ResultWriter::resume(path, sample(), 3, 5); }),
+             {"has 2 frames", "3 are needed"});
+  ResultMesh other = sample();
+  std::swap(other.mesh.tets[0], other.mesh.tets[1]);
+  check_says(sentence([&] { ResultWriter::resume(path, other, 1, 5); }), {"another mesh"});
+  check_frames(path, 2);
+
+  // A file in place of the folder.
+  check_says(sentence([&] {
+               ResultWriter::create(path / "deeper.vtkhdf", sample(), 2,
+                                    ResultWriter::IfExists::refuse);
+             }),
+             {"folder", path.string()});
+}
