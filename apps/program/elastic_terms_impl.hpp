@@ -2,6 +2,7 @@
 #pragma once
 
 #include <taut/apps/program/elastic_terms.hpp>
+#include <taut/core/report/error.hpp>
 
 namespace taut {
 

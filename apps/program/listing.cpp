@@ -4,6 +4,7 @@
 #include <taut/apps/program/methods.hpp>
 #include <taut/apps/program/scene_geometry.hpp>
 #include <taut/core/fem/rest_shape.hpp>
+#include <taut/core/report/error.hpp>
 
 #include <fmt/core.h>
 

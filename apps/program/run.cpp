@@ -6,6 +6,7 @@
 #include <taut/core/io/checkpoint.hpp>
 #include <taut/core/io/mesh_reader.hpp>
 #include <taut/core/io/vtkhdf.hpp>
+#include <taut/core/report/error.hpp>
 #include <taut/core/report/progress.hpp>
 #include <taut/core/report/report_log.hpp>
 #include <taut/core/report/timer.hpp>

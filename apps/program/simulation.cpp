@@ -2,6 +2,7 @@
 #include <taut/apps/program/simulation.hpp>
 #include <taut/core/fem/ordering.hpp>
 #include <taut/core/fem/rest_shape.hpp>
+#include <taut/core/report/error.hpp>
 
 #include <cmath>
 

@@ -342,10 +342,16 @@ struct InversionSweep {
     }
     constexpr double infinity = Kokkos::Experimental::infinity_v<double>;
     if (motion == 0) return infinity;
+    // J has the sign of det(D) det(B): a rest tet may be numbered either way round.
+    Mat3<double> B;
+    auto const* rest = patches.rest.data() + std::size_t(e / lanes) * 10 * lanes + e % lanes;
+    for (int k = 0; k < 9; ++k) B.a[k] = double(rest[k * lanes]);
+    double const sign = determinant(B) < 0 ? -1 : 1;
     Mat3<double> const C = cofactor(D), c = cofactor(d);
-    double const det = dot(D.column(0), C.column(0));
+    double const det = sign * dot(D.column(0), C.column(0));
     if (!(det > 0)) return strict ? 0 : infinity;
-    return smallest_positive_root(det, contract(C, d), contract(D, c), determinant(d));
+    return smallest_positive_root(det, sign * contract(C, d), sign * contract(D, c),
+                                  sign * determinant(d));
   }
 
   KOKKOS_FUNCTION void operator()(typename S::team_member const& team, double& smallest) const {

@@ -1,0 +1,178 @@
+// Line searches on a line: length, energy, gradient and place after each of them.
+#include "toy_objectives.hpp"
+
+#include <taut/integrators/line_search.hpp>
+
+#include <catch2/catch_test_macros.hpp>
+#include <catch2/matchers/catch_matchers_floating_point.hpp>
+
+#include <cmath>
+#include <limits>
+
+using namespace taut;
+using Catch::Matchers::WithinAbs;
+using Catch::Matchers::WithinRel;
+
+namespace {
+
+/// The line from the start of a chain along -g (times a factor), in fp64.
+template <class Bond>
+struct Setting {
+  using Chain = toy::Chain<Bond>;
+  Chain chain;
+  typename Chain::Positions x;
+  DescentFields<Fp64, DefaultSpace> fields;
+  double slope = 0;
+
+  explicit Setting(double length = 1, toy::ChainParams const& params = {})
+      : chain(params), x(chain.start()) {
+    fields.resize(chain.size());
+    chain.gradient(x, fields.gradient);
+    for (int i = 0; i < chain.size(); ++i)
+      for (int c = 0; c < 3; ++c) {
+        fields.direction(i, c) = -length * fields.gradient(i, c);
+        slope += fields.gradient(i, c) * fields.direction(i, c);
+      }
+  }
+  Line<Chain> line() { return {chain, x, fields, {}, slope, 0}; }
+
+  /// Whether x is where a step of this length leads.
+  bool arrived(double alpha) const {
+    auto const from = chain.start();
+    bool same = true;
+    for (int i = 0; i < chain.size(); ++i)
+      for (int c = 0; c < 3; ++c)
+        same = same && x(i, c) == from(i, c) + alpha * fields.direction(i, c);
+    return same;
+  }
+  double energy_change() const { return chain.value(x) - chain.value(chain.start()); }
+  /// g'p at x, over g'p at the beginning.
+  double slope_ratio() {
+    chain.gradient(x, fields.gradient_before);
+    double sum = 0;
+    for (int i = 0; i < chain.size(); ++i)
+      for (int c = 0; c < 3; ++c) sum += fields.gradient_before(i, c) * fields.direction(i, c);
+    return sum / slope;
+  }
+};
+
+}  // namespace
+
+TEST_CASE("the Newton step minimises a quadratic along the line") {
+  Setting<toy::Anisotropic> s;
+  auto line = s.line();
+  Step const step = NewtonStep()(line, 0);
+  CHECK(s.arrived(step.length));
+  CHECK(step.length == -s.slope / s.chain.quadratic_form(s.chain.start(), s.fields.direction));
+  CHECK_FALSE(step.evaluated);
+  CHECK_FALSE(step.cut);
+  CHECK_THAT(step.energy_change, WithinRel(s.energy_change(), 1e-9));
+  CHECK_THAT(s.slope_ratio(), WithinAbs(0, 1e-9));
+}
+
+TEST_CASE("a given first length is tried first") {
+  Setting<toy::Anisotropic> s;
+  auto line = s.line();
+  double const length = 0.25 * line.newton_length();
+  CHECK(NewtonStep()(line, length).length == length);
+  auto again = s.line();
+  CHECK(SufficientDecrease()(again, length).length == length);
+}
+
+TEST_CASE("the displacement clamp of the paper") {
+  Setting<toy::Anisotropic> s;
+  auto line = s.line();
+  double const largest = line.largest_norm();
+  NewtonStep const search({.bound = {.max_displacement = 1e-3}});
+  Step const step = search(line, 0);
+  CHECK(step.cut);
+  CHECK_THAT(step.length, WithinRel(1e-3 / largest, 1e-15));
+  CHECK(step.aimed > step.length);
+  // With the clamped length, as the paper does.
+  double const form = s.chain.quadratic_form(s.x, s.fields.direction);
+  CHECK_THAT(step.energy_change,
+             WithinRel(step.length * s.slope + 0.5 * step.length * step.length * form, 1e-14));
+}
+
+TEST_CASE("no step leaves more than the asked fraction of what is valid") {
+  Setting<toy::Barrier> s;
+  auto line = s.line();
+  double const valid = s.chain.max_step(s.x, s.fields.direction);
+  REQUIRE(10 * valid < 1e3);
+  Step const step = SufficientDecrease({.bound = {.fraction = 0.3}})(line, 10 * valid);
+  CHECK(step.cut);
+  CHECK(step.length <= 0.3 * valid);
+  CHECK(step.aimed == 10 * valid);
+  CHECK(step.found);
+  CHECK(step.energy_change < 0);
+}
+
+TEST_CASE("sufficient decrease shortens a step that is too long") {
+  Setting<toy::Quartic> s;
+  auto line = s.line();
+  double const length = 20 * line.newton_length();
+  SufficientDecrease::Params const params;
+  Step const step = SufficientDecrease(params)(line, length);
+  REQUIRE(step.found);
+  CHECK(step.backtracks > 0);
+  CHECK(step.evaluated);
+  CHECK(s.arrived(step.length));
+  CHECK_THAT(step.energy_change, WithinRel(s.energy_change(), 1e-9));
+  CHECK(step.energy_change <= params.armijo * step.length * s.slope);
+  // The gradient of the new place has been left in gradient_before.
+  typename toy::Chain<toy::Quartic>::Field const g("g", s.chain.size());
+  s.chain.gradient(s.x, g);
+  CHECK(g(5, 1) == s.fields.gradient_before(5, 1));
+}
+
+TEST_CASE("sufficient decrease gives up where nothing decreases, and leaves x alone") {
+  Setting<toy::Quartic> s(-1);  // uphill
+  s.slope = -s.slope;           // by a gradient that is wrong
+  auto line = s.line();
+  Step const step = SufficientDecrease()(line, 1e-3);
+  CHECK_FALSE(step.found);
+  CHECK(step.backtracks == SufficientDecrease::Params().max_backtracks);
+  CHECK(s.arrived(0));
+}
+
+TEST_CASE("without inertia a step without curvature has a reach") {
+  Setting<toy::Quartic> s(1, {.has_inertia = false});
+  // Neighbours that coincide: no curvature is left after filtering.
+  for (int i = 0; i < s.chain.size(); ++i)
+    for (int c = 0; c < 3; ++c) s.x(i, c) = 1e-3 * i;
+  auto line = s.line();
+  CHECK(line.newton_length() == std::numeric_limits<double>::infinity());
+  Step const step = NewtonStep({.bound = {.reach = 2}})(line, 0);
+  CHECK_THAT(step.length * line.largest_norm(), WithinRel(2 * s.chain.scale().length, 1e-14));
+}
+
+TEST_CASE("the exact line search finds the minimum along the line") {
+  SECTION("close to the first length") {
+    Setting<toy::Quartic> s;
+    auto line = s.line();
+    Step const step = ExactLineSearch()(line, 0);
+    CHECK(step.found);
+    CHECK_THAT(s.slope_ratio(), WithinAbs(0, 1e-9));
+    CHECK(s.energy_change() < 0);
+  }
+  SECTION("far beyond it") {
+    Setting<toy::Anisotropic> s;
+    auto line = s.line();
+    double const minimum = line.newton_length();
+    CHECK_THAT(ExactLineSearch()(line, 1e-3 * minimum).length, WithinRel(minimum, 1e-9));
+  }
+  SECTION("far before it") {
+    Setting<toy::Anisotropic> s;
+    auto line = s.line();
+    double const minimum = line.newton_length();
+    CHECK_THAT(ExactLineSearch()(line, 1e3 * minimum).length, WithinRel(minimum, 1e-9));
+  }
+  SECTION("up to where a barrier forbids more") {
+    Setting<toy::Barrier> s;
+    auto line = s.line();
+    Step const step = ExactLineSearch({.bound = {.fraction = 0.999}})(line, 0);
+    CHECK(step.found);
+    CHECK(step.length < s.chain.max_step(s.chain.start(), s.fields.direction));
+    CHECK((step.cut || std::abs(s.slope_ratio()) < 1e-9));
+  }
+}

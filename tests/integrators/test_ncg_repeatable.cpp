@@ -1,0 +1,67 @@
+// The same answer bit for bit: for 1 and 2 threads, in serial, for both layouts, and run after run.
+#include "toy_objectives.hpp"
+
+#include <taut/integrators/lbfgs.hpp>
+#include <taut/integrators/ncg.hpp>
+
+#include <catch2/catch_template_test_macros.hpp>
+#include <catch2/catch_test_macros.hpp>
+
+#include <vector>
+
+#ifdef KOKKOS_ENABLE_OPENMP
+#include <omp.h>
+#endif
+
+using namespace taut;
+
+namespace {
+
+// More unknowns than one run of a sum, so that threads share the work.
+constexpr toy::ChainParams params{.size = 3000};
+
+/// All positions after 25 iterations.
+template <class Method>
+std::vector<double> result() {
+  toy::Chain<toy::Barrier, typename Method::Precision, typename Method::Space> chain(params);
+  auto const x = chain.start();
+  typename Method::Params method;
+  method.stop.tolerance = 0;
+  method.budget.max_iterations = 25;
+  Method(method).minimise(chain, x);
+  auto const host = Kokkos::create_mirror_view_and_copy(Kokkos::HostSpace(), x);
+  std::vector<double> values;
+  for (int i = 0; i < params.size; ++i)
+    for (int c = 0; c < 3; ++c) values.push_back(double(host(i, c)));
+  return values;
+}
+
+template <class S>
+using Conjugate = Ncg<DaiKou, BlockJacobi, SufficientDecrease, DecrementWindow, Mixed, S>;
+template <class S>
+using Memory = Lbfgs<BlockJacobi, SufficientDecrease, DecrementWindow, Mixed, S>;
+
+using Right = Space<Kokkos::Serial, Kokkos::LayoutRight>;
+using Left = Space<Kokkos::Serial, Kokkos::LayoutLeft>;
+
+}  // namespace
+
+TEST_CASE("runs repeat bitwise, for any number of threads") {
+  auto const conjugate = result<Conjugate<DefaultSpace>>();
+  CHECK(result<Conjugate<DefaultSpace>>() == conjugate);
+  auto const memory = result<Memory<DefaultSpace>>();
+#ifdef KOKKOS_ENABLE_OPENMP
+  int const threads = omp_get_max_threads();
+  omp_set_num_threads(1);
+  CHECK(result<Conjugate<DefaultSpace>>() == conjugate);
+  CHECK(result<Memory<DefaultSpace>>() == memory);
+  omp_set_num_threads(threads);
+#endif
+  CHECK(result<Conjugate<Right>>() == conjugate);
+  CHECK(result<Memory<Right>>() == memory);
+}
+
+TEST_CASE("both layouts give the same") {
+  CHECK(result<Conjugate<Left>>() == result<Conjugate<Right>>());
+  CHECK(result<Memory<Left>>() == result<Memory<Right>>());
+}

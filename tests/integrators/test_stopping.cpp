@@ -1,0 +1,125 @@
+// When to stop, and whether the error that is predicted then is the error that is there.
+#include "oracle.hpp"
+
+#include <taut/integrators/ncg.hpp>
+
+#include <catch2/catch_test_macros.hpp>
+#include <catch2/generators/catch_generators.hpp>
+#include <catch2/matchers/catch_matchers_floating_point.hpp>
+
+#include <cmath>
+#include <limits>
+#include <string>
+
+using namespace taut;
+using Catch::Matchers::WithinRel;
+
+namespace {
+
+Progress step(double decrement) {
+  return {.decrement = decrement, .attainable = decrement, .curvature = 2, .gradient_norm = 1};
+}
+
+}  // namespace
+
+TEST_CASE("the decrement window stops when the sum of its steps is small") {
+  // 1/2 M (tol L)^2 = 1/2 4 (0.1 0.5)^2 = 5e-3
+  DecrementWindow rule({.tolerance = 0.1, .window = 4});
+  rule.start({.mass = 4, .length = 0.5, .time_step = 1, .has_inertia = true});
+  CHECK(rule.error_estimate() == std::numeric_limits<double>::infinity());
+  CHECK(rule.check(step(1e-9)) == Stop::none);  // one step is not a window
+  CHECK_THAT(rule.error_estimate(), WithinRel(std::sqrt(2 * 4e-9 / 4), 1e-14));
+  CHECK(rule.check(step(1)) == Stop::none);
+  for (double const decrement : {1e-3, 1e-3, 1e-3, 3e-3}) {
+    CHECK(rule.check(step(decrement)) == Stop::none);  // the 1, or 6e-3
+  }
+  CHECK_THAT(rule.error_estimate(), WithinRel(std::sqrt(2 * 6e-3 / 4), 1e-14));
+  CHECK(rule.check(step(-1e-9)) == Stop::none);
+  CHECK(rule.check(step(1e-9)) == Stop::converged_by_decrement);  // 4e-3 + 2e-9
+  rule.forget();
+  CHECK(rule.check(step(0)) == Stop::none);
+
+  // A step that was cut counts with what it could have gained.
+  for (int k = 0; k < 9; ++k) CHECK(rule.check({.decrement = 0, .attainable = 1}) == Stop::none);
+  // When nothing more is possible, one figure stands for all that was to come.
+  CHECK(rule.check({.decrement = 0, .attainable = 1e-9, .stuck = true}) ==
+        Stop::converged_by_decrement);
+}
+
+TEST_CASE("without inertia the smallest curvature seen scales the estimate") {
+  DecrementWindow rule({.tolerance = 0.1, .window = 1});
+  rule.start({.mass = 4, .length = 0.5, .time_step = 1, .has_inertia = false});
+  rule.check({.decrement = 1, .attainable = 1, .curvature = 50});
+  CHECK_THAT(rule.error_estimate(), WithinRel(std::sqrt(2.0 / (50 * 4)), 1e-14));
+  rule.check({.decrement = 1, .attainable = 1, .curvature = 8});
+  rule.check({.decrement = 1, .attainable = 1, .curvature = 50});
+  CHECK_THAT(rule.error_estimate(), WithinRel(std::sqrt(2.0 / (8 * 4)), 1e-14));
+}
+
+TEST_CASE("the paper's rule compares with the first step") {
+  EnergyDrop rule({.tolerance = 1e-2});
+  rule.start({});
+  CHECK(rule.check(step(5)) == Stop::none);
+  CHECK(rule.check(step(6e-2)) == Stop::none);
+  CHECK(rule.check(step(4e-2)) == Stop::converged_by_energy_drop);
+  rule.start({});
+  CHECK(rule.check(step(4e-2)) == Stop::none);
+
+  EnergyDrop patient({.tolerance = 1e-2, .min_iterations = 2});
+  patient.start({});
+  patient.check(step(1));
+  CHECK(patient.check(step(0)) == Stop::none);
+  CHECK(patient.check(step(0)) == Stop::converged_by_energy_drop);
+}
+
+TEST_CASE("gradient norms are absolute or relative") {
+  Progress progress = step(1);
+  GradientNorm absolute({.tolerance = 1e-2});
+  absolute.start({.mass = 1, .length = 3});
+  progress.gradient_norm = 0.031;
+  CHECK(absolute.check(progress) == Stop::none);
+  progress.gradient_norm = 0.029;
+  CHECK(absolute.check(progress) == Stop::converged_by_gradient);
+
+  GradientNorm relative({.tolerance = 1e-2, .relative = true});
+  relative.start({.mass = 1, .length = 3});
+  progress.gradient_norm = 7;
+  CHECK(relative.check(progress) == Stop::none);
+  progress.gradient_norm = 0.071;
+  CHECK(relative.check(progress) == Stop::none);
+  progress.gradient_norm = 0.069;
+  CHECK(relative.check(progress) == Stop::converged_by_gradient);
+}
+
+TEST_CASE("any of several rules stops, and each can be switched off") {
+  using Rules = AnyOf<DecrementWindow, EnergyDrop>;
+  Rules::Params params;
+  params.rules = {{.tolerance = 0, .window = 1}, {.tolerance = 1e-2}};
+  Rules rule(params);
+  rule.start({.mass = 2});
+  CHECK(rule.check(step(1)) == Stop::none);
+  CHECK_THAT(rule.error_estimate(), WithinRel(1.0, 1e-14));
+  CHECK(rule.check(step(1e-3)) == Stop::converged_by_energy_drop);
+}
+
+TEST_CASE("the predicted error is the error") {
+  // Rigid motion, which a norm of P^-1 g would not see, is in all of these: the targets are far
+  // away.
+  std::string const beta = GENERATE("dk", "prp+", "hs", "hz");
+  double const tolerance = GENERATE(1e-2, 1e-3, 1e-5);
+  bool const has_inertia = GENERATE(true, false);
+  CAPTURE(beta, tolerance, has_inertia);
+  using Method = Ncg<AnyBeta, BlockJacobi, SufficientDecrease, DecrementWindow, Fp64>;
+  Method::Params params;
+  params.beta = AnyBeta(beta);
+  params.stop.tolerance = tolerance;
+  params.budget.max_iterations = 5000;
+
+  toy::Chain<toy::Barrier> chain({.size = 60, .has_inertia = has_inertia, .pinned = 1});
+  auto const x = chain.start();
+  auto const report = Method(params).minimise(chain, x);
+  CHECK(report.stop == Stop::converged_by_decrement);
+  CHECK(report.error_estimate_m < tolerance * chain.scale().length);
+  // Never much worse than predicted; often far better, as CG ends abruptly on so few unknowns.
+  CHECK(toy::distance_to_minimum(chain, x) < 2 * report.error_estimate_m);
+}
