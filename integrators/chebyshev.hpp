@@ -12,6 +12,7 @@
 // does not cover: lambda^2 = omega mu lambda + 1 - omega gives its mu (Young 1971).
 #pragma once
 
+#include <taut/core/report/error.hpp>
 #include <taut/integrators/descent.hpp>
 
 namespace taut {

@@ -230,6 +230,7 @@ private:
   bool advance_prescribed() {
     if (prescribed_left_) prescribed_left_ = e_.advance_prescribed(x_);
     if (!prescribed_left_) return false;
+    if (!step_.found) ++report_.iterations;  // the motion alone uses up budget too
     ++report_.restarts.prescribed;
     direction_.restart();
     rule_.forget();

@@ -5,6 +5,7 @@
 // over the unknowns whatever the window.
 #pragma once
 
+#include <taut/core/report/error.hpp>
 #include <taut/integrators/descent.hpp>
 
 #include <array>

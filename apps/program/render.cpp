@@ -81,11 +81,9 @@ int render_command(RenderOptions const& options) {
     arguments.insert(arguments.end(), {"--animation", fs::absolute(animation).string(), "--fps",
                                        fmt::format("{}", options.frames_per_second),
                                        "--most-frames", std::to_string(options.most_frames)});
-    script.modules.push_back("imageio");
-    script.packages.push_back("imageio");
     if (options.animation == "mp4") {
-      script.modules.push_back("imageio_ffmpeg");
-      script.packages.push_back("imageio-ffmpeg");
+      script.modules.insert(script.modules.end(), {"imageio", "imageio_ffmpeg"});
+      script.packages.insert(script.packages.end(), {"imageio", "imageio-ffmpeg"});
     }
   }
   fs::create_directories(out);

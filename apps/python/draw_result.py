@@ -11,6 +11,7 @@ import sys
 os.environ.pop("DISPLAY", None)  # draw off screen even where there is one
 import numpy as np
 import pyvista as pv
+from PIL import Image
 
 # Okabe and Ito's colours, lightened a little: told apart by all kinds of colour vision.
 COLOURS = ["#4a9bd1", "#e8894a", "#3fb58f", "#e2b93b", "#d98cb8", "#7fc4ec", "#8a8a8a"]
@@ -114,10 +115,7 @@ class Picture:
 
 
 def animate(path, picture, chosen, fps):
-    import imageio.v2 as imageio
-
     if path.endswith(".gif"):
-        from PIL import Image
         # One palette for all frames, or colours would flicker.
         images = [Image.fromarray(picture.show(frame)) for frame in chosen]
         palette = images[len(images) // 2].quantize(255)
@@ -125,6 +123,7 @@ def animate(path, picture, chosen, fps):
         images[0].save(path, save_all=True, append_images=images[1:], duration=round(1000 / fps),
                        loop=0, optimize=False)
     else:
+        import imageio.v2 as imageio
         with imageio.get_writer(path, fps=fps, codec="libx264", quality=8) as writer:
             for frame in chosen:
                 writer.append_data(picture.show(frame))
@@ -148,12 +147,10 @@ def main():
     moving = list(range(0, len(frames), stride)) if options.animation else []
     picture = Picture(frames, sorted({*options.frames, *moving}), options)
     for frame in options.frames:
-        image = pv.Plotter  # keeps pyvista's writer out: Pillow is what it would use
-        from PIL import Image
         Image.fromarray(picture.show(frame)).save(
             os.path.join(options.out, f"frame_{frame:05}.png"))
     if moving:
-        animate(options.animation, picture, moving, options.fps / 1.0)
+        animate(options.animation, picture, moving, options.fps)
 
 
 if __name__ == "__main__":

@@ -383,7 +383,7 @@ public:
     double const patience = distance < 1e-3 * unknowns_.length ? 1.0 : 0.125;
     double const fraction = Kokkos::min(
         1.0, Kokkos::max(0.5 * max_prescribed_step(x, direction_), Kokkos::min(patience, allowed)));
-    if (!(fraction * distance > 0)) {
+    if (!(fraction * distance > 1e-12 * unknowns_.length) && fraction < 1) {
       throw Error(
           "the prescribed motion folds an element that is already flat: reduce the motion per step "
           "or release the pinned vertices around it");

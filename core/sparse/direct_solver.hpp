@@ -33,7 +33,8 @@ public:
     return factorize(host_copy(a));
   }
 
-  /// Solves A x = b for 3n numbers, unknown by unknown; b and x may be the same. Allocates nothing.
+  /// Solves A x = b for 3n numbers, unknown by unknown; b and x may be the same. Allocates
+  /// nothing; not for two threads at once.
   /// Throws Error without a factor (before `factorize`, or after one that found A singular) or for
   /// vectors of another length.
   void solve(std::span<double const> b, std::span<double> x) const;

@@ -6,6 +6,7 @@
 #include <taut/core/fem/ordering.hpp>
 #include <taut/core/fem/shapes.hpp>
 #include <taut/core/potential/potential.hpp>
+#include <taut/core/sparse/operations.hpp>
 #include <taut/materials/models.hpp>
 
 #include <catch2/catch_template_test_macros.hpp>
