@@ -122,7 +122,8 @@ private:
       if (report_.iterations > 0) Kokkos::deep_copy(typename S::execution(), x_, fields_.from);
       report_.stop = Stop::non_finite;
     } else if (heading.descent == 0) {
-      if (advance_prescribed()) return;
+      if (advance_prescribed())
+        return void(++report_.iterations);  // motion alone uses up budget too
       rule_.check({.stuck = true});
       report_.stop = Stop::converged_by_gradient;
     } else {
@@ -215,7 +216,9 @@ private:
     if (!heading.steepest) {
       ++report_.restarts.armijo;
       direction_.restart();
-    } else if (!advance_prescribed()) {
+    } else if (advance_prescribed()) {
+      ++report_.iterations;  // motion alone uses up budget too
+    } else {
       double const promised = 0.5 * std::abs(heading.slope * line.newton_length());
       report_.stop = rule_.check({.decrement = promised,
                                   .attainable = promised,
@@ -230,7 +233,6 @@ private:
   bool advance_prescribed() {
     if (prescribed_left_) prescribed_left_ = e_.advance_prescribed(x_);
     if (!prescribed_left_) return false;
-    if (!step_.found) ++report_.iterations;  // the motion alone uses up budget too
     ++report_.restarts.prescribed;
     direction_.restart();
     rule_.forget();
