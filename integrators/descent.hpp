@@ -184,6 +184,7 @@ private:
                             .gradient_norm = report_.gradient_norm};
     largest_decrement_ = std::max(largest_decrement_, decrement);
     report_.energy_change += step_.energy_change;
+    recent_change_ += step_.energy_change;
     Stop const stop = rule_.check(progress);
     if (observer_) {
       observer_({report_.iterations, x_, step_.length, heading.beta, heading.gamma, heading.slope,
@@ -198,13 +199,13 @@ private:
     if (!advance_prescribed()) report_.stop = stop != Stop::none ? stop : check_progress();
   }
 
-  /// Stalled if the energy is where it was `patience` steps ago: all that is left is round-off,
-  /// which the line search lets pass.
+  /// Stalled if the last `patience` steps together did not lower the energy: all that is left is
+  /// round-off, which the line search lets pass. (Their own sum: the total is too coarse a scale.)
   Stop check_progress() {
     constexpr int patience = 32;
     if (report_.iterations % patience != 0) return Stop::none;
-    bool const fell = report_.energy_change < marked_energy_;
-    marked_energy_ = report_.energy_change;
+    bool const fell = recent_change_ < 0;
+    recent_change_ = 0;
     return fell ? Stop::none : Stop::stalled;
   }
 
@@ -257,7 +258,7 @@ private:
   bool fresh_curvature_ = false;  ///< preconditioner's curvature() was filled at x
   bool prescribed_left_ = true;
   double largest_decrement_ = 0;
-  double marked_energy_ = 0;  ///< energy change up to the last check of progress
+  double recent_change_ = 0;  ///< of energy, since check_progress() last looked
   MinimiserReport report_;
 };
 

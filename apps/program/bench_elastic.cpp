@@ -12,8 +12,9 @@
 namespace taut {
 
 BenchBody::BenchBody(int tets) {
-  // The box of n^3 cells has 12 n^2 (n + 1) tets.
+  auto const tets_of = [](int n) { return 12 * n * n * (n + 1); };  // a box of n^3 cells
   int n = std::max(1, static_cast<int>(std::cbrt(tets / 12.0)));
+  if (tets_of(n + 1) - tets < tets - tets_of(n)) ++n;
   TetMesh const mesh = make_shape(BoxShape{}, n);
   Ordering const order = locality_order(mesh);
   for (std::int32_t v : order.vertices) rest.points.push_back(mesh.points[v]);

@@ -35,6 +35,11 @@ std::string describe(Scene const& scene, SceneGeometry const& geometry) {
       Kokkos::DefaultExecutionSpace().concurrency());
 }
 
+std::string describe_target(ChartOptions const& options) {
+  return fmt::format("# target = {:g}\n# length = {}\n", options.target,
+                     options.length ? fmt::format("{:g} m", *options.length) : "motion");
+}
+
 std::string field(double number) {
   return std::isfinite(number) ? fmt::format("{:.6g}", number) : std::string();
 }

@@ -49,8 +49,8 @@ std::string compare_methods(std::filesystem::path const& file, ChartOptions cons
   std::vector<int> frames = options.frames;
   if (frames.empty()) frames = {std::min(10, scene.frames)};
 
-  std::string header = "# kind = comparison\n" + describe(scene, geometry) +
-                       fmt::format("# target = {:g}\n", options.target);
+  std::string header =
+      "# kind = comparison\n" + describe(scene, geometry) + describe_target(options);
   std::string table = "frame,method,iteration,seconds,position_error,energy_gap,ended\n";
   Reference reference(file, options.scene.changes, geometry);
   for (int frame : frames) {

@@ -14,7 +14,7 @@ std::string sweep_methods(std::filesystem::path const& file, ChartOptions const&
     throw Error("{}: the scene has no [sweep]: give it a key and values, or leave --sweep out",
                 file.string());
   }
-  if (options.frames.size() > 1) throw Error("--frames: a sweep compares one frame, name one");
+  if (options.frames.size() > 1) throw Error("--frame: a sweep compares one frame, name one");
   int const frame = options.frames.empty() ? std::min(10, whole.frames) : options.frames.front();
   // A method has proven itself well below the target: an error may rise again.
   TraceLimits const limits{options.target / 10, options.max_seconds, options.repetitions};
@@ -27,9 +27,8 @@ std::string sweep_methods(std::filesystem::path const& file, ChartOptions const&
     Scene const scene = load_scene(file, changes);
     SceneGeometry const geometry = build_geometry(scene);
     if (header.empty()) {
-      header = "# kind = sweep\n" + describe(scene, geometry) +
-               fmt::format("# target = {:g}\n# key = {}\n# frame = {}\n", options.target,
-                           whole.sweep->key, frame);
+      header = "# kind = sweep\n" + describe(scene, geometry) + describe_target(options) +
+               fmt::format("# key = {}\n# frame = {}\n", whole.sweep->key, frame);
     }
     ReferenceStep const step = Reference(file, changes, geometry).advance_to(frame);
     StepMeasure const measure(scene, geometry, frame, step.start, step.solution, options.length);

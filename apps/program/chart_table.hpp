@@ -25,6 +25,9 @@ std::vector<Contestant> contestants(std::filesystem::path const& scene, SceneCha
 /// What every chart says about its scene and machine.
 std::string describe(Scene const& scene, SceneGeometry const& geometry);
 
+/// The error that counts as solved, and what errors of position are relative to.
+std::string describe_target(ChartOptions const& options);
+
 /// A number as a field of a row: empty if it is not one.
 std::string field(double number);
 

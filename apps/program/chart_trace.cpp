@@ -107,7 +107,7 @@ Reference::Reference(std::filesystem::path const& scene, SceneChanges const& cha
 
 ReferenceStep Reference::advance_to(int step) {
   if (step <= simulation_->steps()) {
-    throw Error("--frames {}: name frames from 1 on, each once, in ascending order", step);
+    throw Error("--frame {}: name frames from 1 on, each once, in ascending order", step);
   }
   ReferenceStep result;
   result.step = step;
@@ -122,7 +122,7 @@ ReferenceStep Reference::advance_to(int step) {
   result.iterations = report.iterations;
   result.stop = report.stop;
   if (!report.converged() && report.stop != Stop::stalled) {
-    throw Error("step {}: the reference does not converge ({}): compare another one with --frames",
+    throw Error("step {}: the reference does not converge ({}): compare another one with --frame",
                 step, to_string(report.stop));
   }
   result.last_move = 0;

@@ -14,12 +14,14 @@ import matplotlib
 
 matplotlib.use("Agg")
 import matplotlib.pyplot as plt
+from matplotlib.patheffects import withStroke
 from matplotlib.ticker import LogLocator, NullFormatter
 
 # Okabe and Ito's colours, told apart by all kinds of colour vision; then again, dashed.
 COLOURS = ["#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#000000"]
 DASHES = ["solid", (0, (5, 1.5)), (0, (1, 1.2)), (0, (5, 1.5, 1, 1.5))]
 INK, PALE = "#333333", "#999999"
+HALO = [withStroke(linewidth=2.5, foreground="white")]
 
 plt.rcParams.update({
     "font.family": "DejaVu Sans", "font.size": 9, "axes.edgecolor": PALE, "axes.linewidth": 0.8,
@@ -71,7 +73,8 @@ def label_ends(axes, ends):
         at = axes.transAxes.inverted().transform(axes.transData.transform((x, y)))
         if at[0] < 0.7:
             axes.annotate(text, xy=(x, y), xytext=(7, 0), textcoords="offset points", color=colour,
-                          va="center", fontsize="small", annotation_clip=False)
+                          va="center", fontsize="small", annotation_clip=False,
+                        path_effects=HALO)
         else:
             placed.append([at[1], at, text, colour])
     for _ in range(500):  # neighbours push each other apart
@@ -139,7 +142,7 @@ def draw_comparison(facts, rows):
                 labels.append((axes, compare_panel(axes, mine, styles, abscissa, measure, target)))
                 if measure == "position_error":
                     axes.axhline(target, color=PALE, lw=0.8, ls=(0, (4, 3)), zorder=1)
-                    axes.annotate(f"{target:.3g}", (1, target), xycoords=("axes fraction", "data"),
+                    axes.annotate(f"target {target:.3g}", (1, target), xycoords=("axes fraction", "data"),
                                   ha="right", va="bottom", fontsize="small", color=PALE)
                     limits = axes.get_ylim()
                     axes.axhspan(limits[0] * 1e-9, resolved, color="#f0f0f0", zorder=0, lw=0)
@@ -209,9 +212,13 @@ def main():
                            top=1 - 0.95 / inches)
     facts = {name: re.sub(r"e\+0?", "e", value) for name, value in facts.items()}
     figure.text(0.02, 1 - 0.12 / inches, facts["scene"], va="top", fontsize=13, fontweight="bold")
+    if facts["kind"] == "sweep":  # what is swept is on the axis
+        facts["materials"] = re.sub(r" \(.*?\)", "", facts["materials"])
+        facts["integrator"] = f"step {facts['frame']} of {facts['integrator']}"
     figure.text(0.02, 1 - 0.40 / inches, f"{int(facts['tets']):,} tets, {facts['materials']}, "
                 f"{facts['integrator']} with {facts['step_s']} s, {facts['threads']} thread"
-                f"{'' if facts['threads'] == '1' else 's'}; errors against projected Newton in fp64",
+                f"{'' if facts['threads'] == '1' else 's'}.  Errors against projected Newton in fp64"
+                f"{', in units of the motion in the step' if facts['length'] == 'motion' else ''}",
                 va="top", color="#666666")
     figure.canvas.draw()  # fixes the limits that labels are placed by
     for axes, ends in labels:

@@ -158,7 +158,9 @@ private:
     Kokkos::parallel_reduce("elastic_max_step", policy(0),
                             kernels::InversionSweep<Space, Precision>{patches_, x, p, strict},
                             Kokkos::Min<double>(smallest));
-    return smallest;
+    // The largest finite number is Kokkos' identity of the minimum.
+    return smallest < std::numeric_limits<double>::max() ? smallest
+                                                         : std::numeric_limits<double>::infinity();
   }
 
   template <kernels::Measure what>

@@ -369,8 +369,9 @@ public:
     for_each<Space>("predict", size(), Kernel{local, unknowns_.fixed, x});
   }
 
-  /// Fixed unknowns go at most half of the way to where the first element would fold, then the free
-  /// ones follow (minimiser iterations), and so on until all have arrived.
+  /// Fixed unknowns go a fifth of the way to where the first element would fold, then the free ones
+  /// follow (minimiser iterations), and so on until all have arrived. In greater strides the gaps
+  /// would close faster than an iteration can open them.
   bool advance_prescribed(Positions const& x) const {
     using Direction = kernels::PrescribedDirection<Space, Precision>;
     double const distance =
@@ -379,10 +380,10 @@ public:
     if (distance == 0) return false;
     // Materials that tolerate inversion may have to fold (a push faster than sound): there the
     // motion is not held up for ever.
-    double const allowed = 0.5 * max_step(x, direction_);
+    double const allowed = 0.2 * max_step(x, direction_);
     double const patience = distance < 1e-3 * unknowns_.length ? 1.0 : 0.125;
     double const fraction = Kokkos::min(
-        1.0, Kokkos::max(0.5 * max_prescribed_step(x, direction_), Kokkos::min(patience, allowed)));
+        1.0, Kokkos::max(0.2 * max_prescribed_step(x, direction_), Kokkos::min(patience, allowed)));
     if (!(fraction * distance > 1e-12 * unknowns_.length) && fraction < 1) {
       throw Error(
           "the prescribed motion folds an element that is already flat: reduce the motion per step "

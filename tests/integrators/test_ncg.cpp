@@ -92,14 +92,15 @@ TEST_CASE("on a quadratic with exact steps all betas are linear CG") {
     return sum;
   };
   std::vector<double> expected;  // energy changes
-  for (double beta = 0, last = 1; expected.size() < 18; last = product(r, z)) {
+  for (double last = 1; expected.size() < 18;) {
     metric.apply(r, z);
-    beta = expected.empty() ? 0 : product(r, z) / last;
+    double const descent = product(r, z), beta = expected.empty() ? 0 : descent / last;
+    last = descent;
     for (int i = 0; i < n; ++i)
       for (int c = 0; c < 3; ++c) p(i, c) = beta * p(i, c) - z(i, c);
     chain.product(start, p, hp);
-    double const alpha = product(r, z) / product(p, hp);
-    expected.push_back(-0.5 * alpha * product(r, z));
+    double const alpha = descent / product(p, hp);
+    expected.push_back(-0.5 * alpha * descent);
     for (int i = 0; i < n; ++i)
       for (int c = 0; c < 3; ++c) r(i, c) += alpha * hp(i, c);
   }

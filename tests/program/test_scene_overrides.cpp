@@ -35,7 +35,7 @@ object.ball.shape.resolution = 1
 
 }  // namespace
 
-TEST_CASE("--set changes and adds values; the last one wins") {
+TEST_CASE("overrides: --set changes and adds values; the last one wins") {
   Scene const scene =
       load(two_objects,
            {"time.step=0.5", "time.step = 0.25", "solver.tolerance=1e-4", "solver.method=newton",

@@ -57,17 +57,14 @@ TEST_CASE("F1: the patch test is exact", "[truth]") {
 
 TEST_CASE("F4: a hanging bar sinks by rho g L^2 / 2E", "[truth]") {
   // In one dimension linear elements are exact at their nodes; here but for a dimple of the mesh.
-  double errors[2];
-  for (int k = 0; k < 2; ++k) {
-    auto overrides =
-        std::vector<std::string>{fmt::format("object.bar.shape.resolution={}", 10 * (k + 1))};
+  // In one dimension linear elements are exact at their nodes; here but for a dimple of the mesh.
+  for (int cells : {10, 20}) {
+    std::vector<std::string> overrides{fmt::format("object.bar.shape.resolution={}", cells)};
     for (auto const& o : tight_newton()) overrides.push_back("solver." + o);
     Trial const trial("hanging_bar", overrides);
     CHECK(trial.simulation->step().converged());
-    errors[k] = std::abs(-lowest_tip(trial) - 0.04905);
+    CHECK_THAT(-lowest_tip(trial), WithinRel(0.04905, 5e-4));
   }
-  CHECK(errors[0] < 0.01 * 0.04905);
-  CHECK(errors[1] < errors[0] / 3 + 1e-9);
 }
 
 TEST_CASE("F4: the default solver reaches the equilibrium within its own error estimate",
@@ -113,7 +110,7 @@ TEST_CASE("F7: the elastica under P L^2 / EI = 1", "[truth]") {
   double const E = 1e6, side = 0.1, I = side * side * side * side / 12;
   double sink[2], draw[2];
   for (int k = 0; k < 2; ++k) {
-    std::vector<std::string> overrides{fmt::format("object.beam.shape.resolution={}", 20 * (k + 1)),
+    std::vector<std::string> overrides{fmt::format("object.beam.shape.resolution={}", 10 * (k + 1)),
                                        fmt::format("force.load.total=[0, {}, 0]", -E * I),
                                        "object.beam.material.poisson=0",
                                        "object.beam.material.model=fixed_corotated"};

@@ -1,0 +1,233 @@
+// `taut chart` from scene to data.csv.
+#include <taut/apps/program/chart.hpp>
+#include <taut/apps/program/chart_method.hpp>
+#include <taut/apps/program/methods.hpp>
+#include <taut/core/io/file.hpp>
+
+#include <catch2/catch_test_macros.hpp>
+#include <catch2/matchers/catch_matchers_exception.hpp>
+#include <catch2/matchers/catch_matchers_string.hpp>
+
+#include <cmath>
+#include <map>
+#include <sstream>
+
+#include "scene_text.hpp"
+
+using namespace taut;
+using Catch::Matchers::ContainsSubstring;
+using Catch::Matchers::MessageMatches;
+
+namespace {
+
+using Row = std::map<std::string, std::string>;
+
+std::vector<std::string> split(std::string const& line) {
+  std::vector<std::string> fields(1);
+  for (char c : line) {
+    if (c == ',') {
+      fields.emplace_back();
+    } else {
+      fields.back() += c;
+    }
+  }
+  return fields;
+}
+
+struct Data {
+  std::string header;
+  std::vector<Row> rows;
+  std::vector<Row> of(std::string const& method) const {
+    std::vector<Row> mine;
+    for (Row const& row : rows)
+      if (row.at("method") == method) mine.push_back(row);
+    return mine;
+  }
+};
+
+Data read_data(std::filesystem::path const& file) {
+  Data data;
+  std::istringstream text(read_file(file));
+  std::vector<std::string> names;
+  for (std::string line; std::getline(text, line);) {
+    if (line.starts_with("# ")) {
+      data.header += line + "\n";
+    } else if (names.empty()) {
+      names = split(line);
+    } else {
+      std::vector<std::string> const fields = split(line);
+      REQUIRE(fields.size() == names.size());
+      Row row;
+      for (std::size_t i = 0; i < names.size(); ++i) row[names[i]] = fields[i];
+      data.rows.push_back(row);
+    }
+  }
+  return data;
+}
+
+double number(Row const& row, std::string const& name) { return std::stod(row.at(name)); }
+
+ChartOptions options_for(test::ScratchFolder const& folder, std::string const& scene) {
+  ChartOptions options;
+  options.scene.scene = folder.write("scene.toml", scene).string();
+  options.out = std::filesystem::path(options.scene.scene).parent_path() / "chart";
+  options.frames = {2};
+  options.repetitions = 1;
+  options.draw = false;
+  return options;
+}
+
+Data chart(ChartOptions const& options) {
+  REQUIRE(chart_command(options) == 0);
+  return read_data(options.out / "data.csv");
+}
+
+}  // namespace
+
+TEST_CASE("methods meet at the solution of the reference", "[chart]") {
+  test::ScratchFolder const folder;
+  ChartOptions options = options_for(folder, test::plain_scene);
+  options.methods = {"dk", "lbfgs", "newton", "dk:precision=fp32", "dk:preconditioner=jacobi"};
+  Data const data = chart(options);
+  CHECK_THAT(data.header, ContainsSubstring("# kind = comparison\n"));
+  CHECK_THAT(data.header, ContainsSubstring("# tets = 144\n"));
+  CHECK_THAT(data.header, ContainsSubstring("# frame 2 length_m = "));
+  CHECK_THAT(data.header, ContainsSubstring("# threads = "));
+
+  for (std::string const method : {"DK", "L-BFGS", "Newton", "DK jacobi"}) {
+    CAPTURE(method);
+    std::vector<Row> const rows = data.of(method);
+    REQUIRE(!rows.empty());
+    for (std::size_t k = 0; k < rows.size(); ++k) {
+      CHECK(number(rows[k], "frame") == 2);
+      CHECK(number(rows[k], "iteration") == double(k + 1));
+      CHECK(number(rows[k], "seconds") >= 0);
+      CHECK(rows[k].at("ended").empty() == (k + 1 < rows.size()));
+    }
+    CHECK(rows.back().at("ended") == "accurate");
+    CHECK(number(rows.back(), "position_error") <= options.lowest);
+    CHECK(number(rows.back(), "energy_gap") < 1e-12);
+  }
+  // Newton's error falls in every iteration, and ever faster.
+  std::vector<Row> const newton = data.of("Newton");
+  REQUIRE(newton.size() >= 2);
+  CHECK(newton.size() < 10);
+  for (std::size_t k = 1; k < newton.size(); ++k)
+    CHECK(number(newton[k], "position_error") < number(newton[k - 1], "position_error"));
+
+  // Single precision has a floor, which is neither the solution nor far from it.
+  std::vector<Row> const single = data.of("DK fp32");
+  CHECK(single.back().at("ended") != "accurate");
+  CHECK(number(single.back(), "position_error") > options.lowest);
+  CHECK(number(single.back(), "position_error") < options.target);
+}
+
+TEST_CASE("every method starts from the same state", "[chart]") {
+  test::ScratchFolder const folder;
+  ChartOptions options = options_for(folder, test::plain_scene);
+  options.methods = {"dk", "gradient", "newton"};
+  Data const one = chart(options);
+  options.methods = {"newton", "dk"};
+  options.force = true;
+  Data const other = chart(options);
+  for (std::string const method : {"DK", "Newton"}) {
+    std::vector<Row> const a = one.of(method), b = other.of(method);
+    REQUIRE(a.size() == b.size());
+    for (std::size_t k = 0; k < a.size(); ++k)
+      CHECK(a[k].at("position_error") == b[k].at("position_error"));
+  }
+}
+
+TEST_CASE("several frames and failures", "[chart]") {
+  test::ScratchFolder const folder;
+  ChartOptions options = options_for(folder, test::plain_scene);
+  options.frames = {1, 3};
+  options.methods = {"gradient"};
+  options.max_iterations = 2;
+  Data const data = chart(options);
+  REQUIRE(data.rows.size() == 4);
+  CHECK(number(data.rows[0], "frame") == 1);
+  CHECK(number(data.rows[2], "frame") == 3);
+  CHECK(data.rows[1].at("ended") == "budget");
+  CHECK(data.rows[3].at("ended") == "budget");
+  CHECK(number(data.rows[3], "position_error") > options.target);
+}
+
+TEST_CASE("a sweep says what it took, or that it failed", "[chart]") {
+  test::ScratchFolder const folder;
+  std::string const sweep =
+      "\n[sweep]\nkey = \"object.cube.material.young\"\nvalues = [1e4, 1e6]\n";
+  ChartOptions options = options_for(folder, test::plain_scene + sweep);
+  options.sweep = true;
+  options.methods = {"dk", "newton", "gradient"};
+  options.max_iterations = 60;
+  Data const data = chart(options);
+  CHECK_THAT(data.header, ContainsSubstring("# kind = sweep\n"));
+  CHECK_THAT(data.header, ContainsSubstring("# key = object.cube.material.young\n"));
+  REQUIRE(data.rows.size() == 6);
+  std::vector<Row> const dk = data.of("DK"), gradient = data.of("gradient");
+  CHECK(number(dk[0], "value") == 1e4);
+  CHECK(number(dk[1], "value") == 1e6);
+  // Stiffness costs conjugate gradients iterations, and gradient descent its life.
+  CHECK(number(dk[0], "iterations") < number(dk[1], "iterations"));
+  CHECK(dk[1].at("ended") == "accurate");
+  CHECK(gradient[1].at("iterations").empty());
+  CHECK(gradient[1].at("seconds").empty());
+  CHECK(gradient[1].at("ended") == "budget");
+  CHECK(number(gradient[1], "position_error") > options.target);
+}
+
+TEST_CASE("a chart that is there stays, unless forced", "[chart]") {
+  test::ScratchFolder const folder;
+  ChartOptions options = options_for(folder, test::plain_scene);
+  options.methods = {"newton"};
+  std::filesystem::create_directories(options.out);
+  write_file_atomically(options.out / "data.csv", "mine");
+  CHECK_THROWS_MATCHES(chart_command(options), Error, MessageMatches(ContainsSubstring("--force")));
+  CHECK(read_file(options.out / "data.csv") == "mine");
+  options.force = true;
+  CHECK(!chart(options).rows.empty());
+}
+
+TEST_CASE("methods of a chart are named with their options", "[chart]") {
+  ChartMethod const method = parse_method("lbfgs:preconditioner=jacobi:history=20");
+  CHECK(method.label == "L-BFGS jacobi history=20");
+  CHECK(method.overrides == std::vector<std::string>{"solver.method=lbfgs",
+                                                     "solver.preconditioner=jacobi",
+                                                     "solver.history=20"});
+  CHECK(parse_methods({}).size() == method_titles().size());
+  CHECK(parse_methods({"all"}).size() == method_titles().size());
+  CHECK_THROWS_MATCHES(parse_method("newtom"), Error,
+                       MessageMatches(ContainsSubstring("\"newton\"")));
+  CHECK_THROWS_MATCHES(parse_method("dk:jacobi"), Error,
+                       MessageMatches(ContainsSubstring("KEY=VALUE")));
+  CHECK_THROWS_MATCHES(parse_methods({"dk", "dk"}), Error,
+                       MessageMatches(ContainsSubstring("twice")));
+}
+
+TEST_CASE("bad charts are refused before anything is written", "[chart]") {
+  test::ScratchFolder const folder;
+  ChartOptions options = options_for(folder, test::plain_scene);
+  auto const refused = [&](std::string const& part) {
+    CHECK_THROWS_MATCHES(chart_command(options), Error, MessageMatches(ContainsSubstring(part)));
+    CHECK(!std::filesystem::exists(options.out / "data.csv"));
+  };
+  SECTION("a key that does not exist") {
+    options.methods = {"dk:preconditoner=jacobi"};
+    refused("preconditioner");
+  }
+  SECTION("a sweep of a scene without one") {
+    options.methods = {"dk"};
+    options.sweep = true;
+    refused("[sweep]");
+  }
+  SECTION("frames out of order") {
+    options.methods = {"newton"};
+    options.frames = {2, 1};
+    refused("--frame 1");
+  }
+  SECTION("a frame before the first") {
+    options.frames = {0};
+    refused("--frame 0");
+  }
+}
