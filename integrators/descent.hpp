@@ -199,14 +199,19 @@ private:
     if (!advance_prescribed()) report_.stop = stop != Stop::none ? stop : check_progress();
   }
 
-  /// Stalled if the last `patience` steps together did not lower the energy: all that is left is
-  /// round-off, which the line search lets pass. (Their own sum: the total is too coarse a scale.)
+  /// Stalled if what remains is round-off, which the line search lets pass: over a window as long
+  /// as everything before it, steps did not lower the energy, or by less on average than its
+  /// round-off and no faster than in the window before.
   Stop check_progress() {
-    constexpr int patience = 32;
-    if (report_.iterations % patience != 0) return Stop::none;
-    bool const fell = recent_change_ < 0;
+    if (report_.iterations < window_end_) return Stop::none;
+    constexpr double epsilon = double(Kokkos::Experimental::epsilon_v<typename P::real>);
+    double const mean = -recent_change_ / (window_end_ - window_end_ / 2);
+    bool const lost_in_noise = mean < 16 * epsilon * largest_decrement_ && mean > 0.7 * last_mean_;
+    bool const stalled = mean <= 0 || lost_in_noise;
     recent_change_ = 0;
-    return fell ? Stop::none : Stop::stalled;
+    last_mean_ = mean;
+    window_end_ *= 2;
+    return stalled ? Stop::stalled : Stop::none;
   }
 
   /// No step along p was good enough. Along -P g that is the end, unless prescribed unknowns are
@@ -258,7 +263,10 @@ private:
   bool fresh_curvature_ = false;  ///< preconditioner's curvature() was filled at x
   bool prescribed_left_ = true;
   double largest_decrement_ = 0;
-  double recent_change_ = 0;  ///< of energy, since check_progress() last looked
+  double recent_change_ = 0;  ///< of energy, since check_progress() last looked,
+  double last_mean_ =
+      std::numeric_limits<double>::infinity();  ///< when this was a step's decrement
+  int window_end_ = 32;                         ///< when it looks again, iterations
   MinimiserReport report_;
 };
 

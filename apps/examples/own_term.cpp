@@ -41,17 +41,17 @@ int main() {
   Kokkos::ScopeGuard const kokkos;
   using namespace taut;
   Bar const bar;
-  // A brace from the upper edge of the fixed end to the lower edge of the free one.
-  int fixed = 0, tip = 0;
-  for (std::size_t i = 0; i < bar.rest.points.size(); ++i) {
-    auto const& p = bar.rest.points;
-    if (p[i][0] - p[i][1] < p[fixed][0] - p[fixed][1]) fixed = int(i);
-    if (p[i][0] - p[i][1] > p[tip][0] - p[tip][1]) tip = int(i);
-  }
+  // Braces from the upper edge of the fixed end to the lower edge of the free one.
+  std::vector<std::array<int, 2>> braces;
+  std::vector<Point> const& p = bar.rest.points;
+  for (int i = 0; i < bar.unknowns.size(); ++i)
+    for (int j = 0; j < bar.unknowns.size(); ++j) {
+      if (p[i][0] - p[i][1] < -1.2 + 1e-9 && p[j][0] - p[j][1] > 1.2 - 1e-9 && p[i][2] == p[j][2])
+        braces.push_back({i, j});
+    }
   auto const sag = [&](double stiffness) {
     ElasticTets<Elastic<StableNeoHookean>> const tets(bar.rest, lame_parameters(3e5, 0.4));
-    StencilTerm<Spring> const spring({stiffness, std::hypot(2, 0.4)}, {{fixed, tip}},
-                                     bar.unknowns.size());
+    StencilTerm<Spring> const spring({stiffness, std::hypot(2, 0.4)}, braces, bar.unknowns.size());
     Potential scene(bar.unknowns, Inertia(bar.unknowns), BodyForce(bar.unknowns, {0, -9.81, 0}),
                     tets, spring);
     ImplicitEuler<Ncg<DaiKou, BlockJacobi>> stepper;

@@ -70,7 +70,8 @@ TEST_CASE("a function that is not convex") {
 }
 
 TEST_CASE("on a quadratic with exact steps all betas are linear CG") {
-  toy::Chain<toy::Anisotropic> chain({.size = 6});
+  // Mild, or round-off costs conjugacy before the end.
+  toy::Chain<toy::Anisotropic> chain({.size = 6}, {.stiffest = 60});
   std::string const preconditioner = GENERATE("identity", "jacobi", "block_jacobi");
   CAPTURE(preconditioner);
 

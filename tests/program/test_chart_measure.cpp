@@ -34,7 +34,8 @@ TEST_CASE("the energy gap is what a minimiser still has to lose", "[chart]") {
   SceneGeometry const geometry = build_geometry(scene);
   auto const simulation = Simulation::create(scene, geometry);
 
-  simulation->step();  // BDF2 begins with a step of implicit Euler
+  int const before_that = scheme == "bdf2" ? 1 : 0;  // it begins with a step of implicit Euler
+  for (int k = 0; k < before_that; ++k) simulation->step();
   std::vector<Point> const before = simulation->positions();
   std::vector<std::vector<Point>> iterates;
   std::vector<double> change;
@@ -44,7 +45,7 @@ TEST_CASE("the energy gap is what a minimiser still has to lose", "[chart]") {
   });
   REQUIRE(iterates.size() >= 3);
   // The last iterate is exact far beyond the margin below.
-  StepMeasure const measure(scene, geometry, 2, before, simulation->positions());
+  StepMeasure const measure(scene, geometry, before_that + 1, before, simulation->positions());
   double const lost = change.front() - change.back();
   REQUIRE(lost > 0);
   for (std::size_t k = 0; k + 1 < iterates.size(); ++k) {

@@ -110,7 +110,7 @@ TEST_CASE("F7: the elastica under P L^2 / EI = 1", "[truth]") {
   double const E = 1e6, side = 0.1, I = side * side * side * side / 12;
   double sink[2], draw[2];
   for (int k = 0; k < 2; ++k) {
-    std::vector<std::string> overrides{fmt::format("object.beam.shape.resolution={}", 10 * (k + 1)),
+    std::vector<std::string> overrides{fmt::format("object.beam.shape.resolution={}", 20 * (k + 1)),
                                        fmt::format("force.load.total=[0, {}, 0]", -E * I),
                                        "object.beam.material.poisson=0",
                                        "object.beam.material.model=fixed_corotated"};
