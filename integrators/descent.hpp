@@ -205,12 +205,12 @@ private:
   Stop check_progress() {
     if (report_.iterations < window_end_) return Stop::none;
     constexpr double epsilon = double(Kokkos::Experimental::epsilon_v<typename P::real>);
-    double const mean = -recent_change_ / (window_end_ - window_end_ / 2);
+    double const mean = -recent_change_ / (window_end_ - window_begin_);
     bool const lost_in_noise = mean < 16 * epsilon * largest_decrement_ && mean > 0.7 * last_mean_;
     bool const stalled = mean <= 0 || lost_in_noise;
     recent_change_ = 0;
     last_mean_ = mean;
-    window_end_ *= 2;
+    window_begin_ = std::exchange(window_end_, 2 * window_end_);
     return stalled ? Stop::stalled : Stop::none;
   }
 

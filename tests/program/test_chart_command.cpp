@@ -141,7 +141,7 @@ TEST_CASE("every method starts from the same state", "[chart]") {
 TEST_CASE("several frames and failures", "[chart]") {
   test::ScratchFolder const folder;
   ChartOptions options = options_for(folder, test::plain_scene);
-  options.scene.overrides = {"object.cube.material.young=1e8"};
+  options.scene.changes.overrides = {"object.cube.material.young=1e8"};
   options.frames = {1, 3};
   options.methods = {"gradient"};
   options.max_iterations = 2;
