@@ -263,10 +263,10 @@ private:
   bool fresh_curvature_ = false;  ///< preconditioner's curvature() was filled at x
   bool prescribed_left_ = true;
   double largest_decrement_ = 0;
-  double recent_change_ = 0;  ///< of energy, since check_progress() last looked,
-  double last_mean_ =
-      std::numeric_limits<double>::infinity();  ///< when this was a step's decrement
-  int window_end_ = 32;                         ///< when it looks again, iterations
+  // check_progress():
+  int window_begin_ = 0, window_end_ = 32;                      ///< iterations
+  double recent_change_ = 0;                                    ///< of energy in this window
+  double last_mean_ = std::numeric_limits<double>::infinity();  ///< decrement of a step in the last
   MinimiserReport report_;
 };
 
