@@ -63,7 +63,7 @@ struct FactorAggregate {
   Kokkos::View<Storage*, typename S::memory> factor;
   int run, scratch_level;
 
-  std::size_t scratch_size() const {
+  KOKKOS_FUNCTION std::size_t scratch_size() const {
     return sizeof(double) * std::size_t(Triangle::row(3 * run) + 3 * run);
   }
 
@@ -139,7 +139,7 @@ struct ApplyAggregate {
   VectorField<R, S> r, z;
   int run;
 
-  std::size_t scratch_size() const { return sizeof(Storage) * std::size_t(6 * run); }
+  KOKKOS_FUNCTION std::size_t scratch_size() const { return sizeof(Storage) * std::size_t(6 * run); }
 
   KOKKOS_FUNCTION void operator()(typename S::team_member const& team) const {
     int const rows = 3 * run, first = run * team.league_rank();
