@@ -85,8 +85,17 @@ KOKKOS_FORCEINLINE_FUNCTION T square(T const& a) {
   return a * a;
 }
 
-using Kokkos::abs;
-using Kokkos::sqrt;
+// Templates instead of `using Kokkos::sqrt`: that would be ambiguous with ::sqrt for whoever writes
+// `using namespace taut`.
+template <class T>
+KOKKOS_FORCEINLINE_FUNCTION T abs(T const& a) {
+  return Kokkos::abs(a);
+}
+
+template <class T>
+KOKKOS_FORCEINLINE_FUNCTION T sqrt(T const& a) {
+  return Kokkos::sqrt(a);
+}
 
 /// Lane `i` of a pack; a scalar has one lane.
 template <class T>
