@@ -12,6 +12,7 @@
 #include <cstdlib>
 #include <functional>
 #include <new>
+#include <optional>
 
 namespace {
 
@@ -132,9 +133,13 @@ int main(int argc, char** argv) {
   elastic_app->add_flag("--json", bench.json, "a JSON list of rows");
   elastic_app->add_flag("--quick", bench.quick, "a small mesh and hasty numbers");
   elastic_app->footer("example: taut bench elastic --materials stable_neo_hookean --tets 500000");
+  elastic_app->add_option("--threads", bench.threads, "numbers of threads (1 and all)")
+      ->delimiter(',')
+      ->check(CLI::Range(1, 4096));
   elastic_app->callback([&] { command = [&] { return bench_command(bench); }; });
 
   for (CLI::App* sub : app.get_subcommands({})) {
+    if (sub == bench_app) continue;
     sub->add_option("--threads", threads, "threads to use (all)")->check(CLI::Range(1, 4096));
   }
   CLI11_PARSE(app, argc, argv);
@@ -142,7 +147,8 @@ int main(int argc, char** argv) {
   Kokkos::InitializationSettings settings;
   settings.set_disable_warnings(true);
   if (threads > 0) settings.set_num_threads(threads);
-  Kokkos::ScopeGuard const kokkos(settings);
+  std::optional<Kokkos::ScopeGuard> kokkos;
+  if (!bench_app->parsed()) kokkos.emplace(settings);  // it starts Kokkos itself
   try {
     return command();
   } catch (Error const& error) {
