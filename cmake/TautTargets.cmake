@@ -27,6 +27,9 @@ add_library(taut_usage INTERFACE)
 set_target_properties(taut_usage PROPERTIES EXPORT_NAME usage)
 target_compile_features(taut_usage INTERFACE cxx_std_20)
 target_compile_options(taut_usage INTERFACE $<$<COMPILE_LANGUAGE:CXX>:-fno-math-errno -fno-trapping-math>)
+# GCC would copy a matrix of packs (9 registers) by a call of memcpy, and keep it in memory; with these it does not.
+target_compile_options(taut_usage INTERFACE
+  "$<$<AND:$<COMPILE_LANGUAGE:CXX>,$<CXX_COMPILER_ID:GNU>>:-fno-tree-loop-distribute-patterns;--param=sra-max-scalarization-size-Ospeed=2048>")
 # Under nvcc fmt 9 takes it that there is no constexpr, and does not compile; Eigen marks its functions for the device,
 # and warns. We use both on the host alone.
 target_compile_definitions(taut_usage INTERFACE $<$<COMPILE_LANGUAGE:CUDA>:FMT_USE_CONSTEXPR=1 EIGEN_NO_CUDA>)

@@ -17,8 +17,9 @@ struct Step {
   double length = 0;         ///< alpha; x has moved by alpha p
   double energy_change = 0;  ///< kg m^2; predicted by the quadratic model unless `evaluated`
   bool evaluated = false;    ///< the gradient where the step ends is known
-  double bound = std::numeric_limits<double>::infinity();  ///< the longest length allowed
-  bool cut = false;                                        ///< the bound made the step shorter
+  /// The longest length allowed; infinity if that is known to be more than was asked for.
+  double bound = std::numeric_limits<double>::infinity();
+  bool cut = false;    ///< the bound made the step shorter
   bool found = true;   ///< false: no step was good enough, x is where it was
   int backtracks = 0;  ///< steps tried and refused
 };
@@ -64,8 +65,8 @@ public:
     Scale const scale = objective_.scale();
     return scale.has_inertia ? std::numeric_limits<double>::infinity() : lengths * scale.length;
   }
-  /// Largest step that is valid; to be asked for before the first move.
-  double max_length() { return objective_.max_step(x_, fields_.direction); }
+  /// Largest step up to `at_most` that is valid; to be asked for before the first move.
+  double max_length(double at_most) { return objective_.max_step(x_, fields_.direction, at_most); }
 
   /// x = from + alpha p
   void move(double alpha) {
@@ -126,13 +127,17 @@ struct StepBound {
   double reach = 10;  ///< the same in Scale::length where curvature may vanish (no inertia)
 
   /// The step to try first: `first`, or if that is 0 the one of the quadratic model, within bounds.
+  /// Step::bound is looked for up to `stretch` times what is tried.
   template <class E>
-  Step first_step(Line<E>& line, double first) const {
+  Step first_step(Line<E>& line, double first, double stretch = 1) const {
     Step step{.aimed = first > 0 ? first : line.newton_length()};
-    if (std::isfinite(fraction)) step.bound = fraction * line.max_length();
     double const displacement = std::min(max_displacement, line.reach(reach));
-    if (std::isfinite(displacement))
-      step.bound = std::min(step.bound, displacement / line.largest_norm());
+    if (std::isfinite(displacement)) step.bound = displacement / line.largest_norm();
+    if (std::isfinite(fraction)) {
+      double const wanted = std::min(stretch * step.aimed, step.bound) / fraction;
+      double const valid = line.max_length(wanted);
+      if (valid < wanted) step.bound = fraction * valid;
+    }
     step.cut = step.aimed > step.bound;
     step.length = std::min(step.aimed, step.bound);
     step.found = step.length != 0;
@@ -215,7 +220,7 @@ public:
   /// Illinois weights). A slope that is not a number lies beyond a barrier.
   template <class E>
   Step operator()(Line<E>& line, double first) const {
-    Step step = params_.bound.first_step(line, first);
+    Step step = params_.bound.first_step(line, first, std::numeric_limits<double>::infinity());
     if (!step.found) return step;
     step.evaluated = true;
     double low = 0, low_slope = line.slope(), high = 0, high_slope = 0, bound = step.bound;

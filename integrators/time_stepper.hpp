@@ -197,8 +197,8 @@ private:
         maximum<Space>("start_direction", state.size(), 0.0,
                        kernels::StartDirection<Precision, Space>{unknowns.fixed, state.x, x_,
                                                                  unknowns.prescribed, direction_});
-    double bound = potential.max_step(state.x, direction_);
-    if (moved > 0) bound = std::min(bound, potential.max_prescribed_step(state.x, direction_));
+    double bound = potential.max_step(state.x, direction_, 2.0);
+    if (moved > 0) bound = potential.max_prescribed_step(state.x, direction_, bound);
     for_each<Space>("start", state.size(),
                     kernels::Start<Precision, Space>{unknowns.fixed, state.x, unknowns.prescribed,
                                                      x_, std::min(1.0, 0.5 * bound)});

@@ -11,6 +11,7 @@
 #include <taut/core/fem/patches.hpp>
 #include <taut/core/math/cubic.hpp>
 #include <taut/core/math/matrix.hpp>
+#include <taut/core/math/rows.hpp>
 
 namespace taut::kernels {
 
@@ -42,7 +43,7 @@ struct PatchSweep {
   }
 
   /// Copies field values of the patch's vertices, less those of its first vertex, in the precision
-  /// of the field; [component][max_locals].
+  /// of the field, in rows of four.
   template <class Team, class Field>
   KOKKOS_FORCEINLINE_FUNCTION void load_relative(Team const& team, int patch, Field const& field,
                                                  ScratchField<S, Real> const& to) const {
@@ -51,8 +52,9 @@ struct PatchSweep {
     Kokkos::parallel_for(Kokkos::TeamThreadRange(team, locals(patch)), [&](int l) {
       int const v = patches.vertex(first + l);
       for (int c = 0; c < 3; ++c) {
-        to(c * patches.max_locals + l) = static_cast<Real>(field(v, c) - field(origin, c));
+        to(4 * l + c) = static_cast<Real>(field(v, c) - field(origin, c));
       }
+      to(4 * l + 3) = 0;
     });
   }
 
@@ -61,47 +63,77 @@ struct PatchSweep {
                                                 ScratchField<S, Real> const& field) const {
     std::uint16_t const* corner = corners(patch, g);
     Mat3<Value> d;
-    for (int c = 0; c < 3; ++c) {
-      Real const* component = field.data() + c * patches.max_locals;
-      Value const origin = gather<Value>(component, corner);
-      for (int a = 1; a < 4; ++a) {
-        d(c, a - 1) = gather<Value>(component, corner + a * lanes) - origin;
-      }
+    Value origin[3], end[3];
+    load_rows(field.data(), corner, origin);
+    for (int a = 1; a < 4; ++a) {
+      load_rows(field.data(), corner + a * lanes, end);
+      for (int c = 0; c < 3; ++c) d(c, a - 1) = end[c] - origin[c];
     }
     return d;
   }
 
   KOKKOS_FORCEINLINE_FUNCTION Mat3<Value> inverse_rest(int patch, int g) const {
     Real const* from = rest(patch, g);
-    Mat3<Value> B;
-    for (int k = 0; k < 9; ++k) B.a[k] = load<Value>(from + k * lanes);
-    return B;
+    auto const entry = [&](int k) { return load<Value>(from + k * lanes); };
+    return {
+        {entry(0), entry(1), entry(2), entry(3), entry(4), entry(5), entry(6), entry(7), entry(8)}};
   }
   KOKKOS_FORCEINLINE_FUNCTION Value volume(int patch, int g) const {
     return load<Value>(rest(patch, g) + 9 * lanes);
   }
 
-  /// Distance between two numbers of a slot: one slot per corner, and an odd number of cache lines
-  /// so that the numbers of one slot do not fall into the same cache set.
-  KOKKOS_FORCEINLINE_FUNCTION int stride() const { return patches.max_packs * 4 * lanes + 16; }
-  /// Where corner `a` of group g leaves its number k: [number][pack][corner][lane].
-  KOKKOS_FORCEINLINE_FUNCTION Real* slot(ScratchField<S, Real> const& slots, int g, int a,
-                                         int k) const {
-    return slots.data() + k * stride() + (g / per_pack * 4 + a) * lanes + g % per_pack * width;
+  /// Whether one thread does the whole patch: then it adds to the vertices as it goes, which needs
+  /// little memory. Several leave what each corner receives in slots, and add up those of a vertex
+  /// when all are there. Both add in the order of the slots: corner by corner within a pack.
+  template <class Team>
+  KOKKOS_FORCEINLINE_FUNCTION static bool alone(Team const& team) {
+    return S::on_host && team.team_size() == 1;
   }
-
-  /// Adds up the slots of each local vertex, in element order, into its row of `partial`.
+  /// Size of the field that `give` works on, for `numbers` per corner.
+  KOKKOS_FORCEINLINE_FUNCTION std::size_t slot_numbers(int numbers) const {
+    return Kokkos::max(numbers * stride(), patches.max_locals * padded(numbers));
+  }
+  template <int numbers, class Team>
+  KOKKOS_FORCEINLINE_FUNCTION void clear(Team const& team, int patch,
+                                         ScratchField<S, Real> const& slots) const {
+    if (!alone(team)) return;
+    for (int k = 0; k < padded(numbers) * locals(patch); ++k) slots(k) = 0;
+  }
+  /// Hands over what corner `a` of group g receives.
+  template <int numbers>
+  KOKKOS_FORCEINLINE_FUNCTION void give(bool to_vertex, int patch, int g, int a,
+                                        Value const (&received)[numbers],
+                                        ScratchField<S, Real> const& slots) const {
+    if (S::on_host && to_vertex) {
+      constexpr int rows = padded(numbers) / 4;
+      std::uint16_t const* corner = corners(patch, g) + a * lanes;
+      add_rows<Kokkos::min(numbers, 4), rows>(received, slots.data(), corner);
+      if constexpr (rows > 1)
+        add_rows<Kokkos::min(numbers - 4, 4), rows>(received + 4, slots.data() + 4, corner);
+      if constexpr (rows > 2) add_rows<numbers - 8, rows>(received + 8, slots.data() + 8, corner);
+    } else {
+      // [number][pack][corner][lane]
+      Real* const slot = slots.data() + (g / per_pack * 4 + a) * lanes + g % per_pack * width;
+      for (int c = 0; c < numbers; ++c) store(received[c], slot + c * stride());
+    }
+  }
+  /// Writes the sum of each local vertex to its row of `partial`.
   template <int numbers, class Team, class Partial>
-  KOKKOS_FORCEINLINE_FUNCTION void gather_slots(Team const& team, int patch,
-                                                ScratchField<S, Real> const& slots,
-                                                Partial const& partial) const {
+  KOKKOS_FORCEINLINE_FUNCTION void take(Team const& team, int patch,
+                                        ScratchField<S, Real> const& slots,
+                                        Partial const& partial) const {
     int const first = patches.local_begin(patch), step = stride();
+    bool const added = alone(team);
     Kokkos::parallel_for(Kokkos::TeamThreadRange(team, locals(patch)), [&](int l) {
       Real sum[numbers] = {};
-      int const last = patches.incidence_begin(first + l + 1);
-      for (int k = patches.incidence_begin(first + l); k < last; ++k) {
-        Real const* from = slots.data() + patches.incidence(k);
-        for (int c = 0; c < numbers; ++c) sum[c] += from[c * step];
+      if (added) {
+        for (int c = 0; c < numbers; ++c) sum[c] = slots(padded(numbers) * l + c);
+      } else {
+        int const last = patches.incidence_begin(first + l + 1);
+        for (int k = patches.incidence_begin(first + l); k < last; ++k) {
+          Real const* from = slots.data() + patches.incidence(k);
+          for (int c = 0; c < numbers; ++c) sum[c] += from[c * step];
+        }
       }
       for (int c = 0; c < numbers; ++c) partial(numbers * (first + l) + c) = sum[c];
     });
@@ -119,6 +151,13 @@ struct PatchSweep {
   }
 
 private:
+  /// Numbers in the rows of four that hold `numbers`.
+  KOKKOS_FORCEINLINE_FUNCTION static constexpr int padded(int numbers) {
+    return (numbers + 3) / 4 * 4;
+  }
+  /// Distance between two numbers of a slot: one slot per corner, and an odd number of cache lines
+  /// so that the numbers of one slot do not fall into the same cache set.
+  KOKKOS_FORCEINLINE_FUNCTION int stride() const { return patches.max_packs * 4 * lanes + 16; }
   KOKKOS_FORCEINLINE_FUNCTION std::uint16_t const* corners(int patch, int g) const {
     return patches.corner.data() +
            std::size_t(patches.pack_begin(patch) + g / per_pack) * 4 * lanes + g % per_pack * width;
@@ -158,25 +197,32 @@ struct GradientSweep : PatchSweep<S, typename Precision::real> {
   Kokkos::View<Real*, typename S::memory> partial;
   Kokkos::View<typename Precision::sum*, typename S::memory> change;
 
-  int numbers() const { return 3 + static_cast<int>(curvature); }
+  KOKKOS_FUNCTION int numbers() const { return 3 + static_cast<int>(curvature); }
 
   std::size_t scratch_bytes() const {
     auto const& v = this->patches;
-    return 2 * ScratchField<S, Real>::shmem_size(std::size_t(3) * v.max_locals) +
-           ScratchField<S, Real>::shmem_size(std::size_t(numbers()) * this->stride()) +
+    return 2 * ScratchField<S, Real>::shmem_size(std::size_t(4) * v.max_locals) +
+           ScratchField<S, Real>::shmem_size(this->slot_numbers(numbers())) +
            ScratchField<S, double>::shmem_size(std::size_t(v.max_packs) * Base::per_pack);
   }
 
   KOKKOS_FUNCTION void operator()(typename S::team_member const& team) const {
     int const patch = team.league_rank();
     auto const& v = this->patches;
-    ScratchField<S, Real> const local_x(team.team_scratch(0), 3 * v.max_locals);
-    ScratchField<S, Real> const local_p(team.team_scratch(0), after_step ? 3 * v.max_locals : 0);
-    ScratchField<S, Real> const slots(team.team_scratch(0),
-                                      (3 + static_cast<int>(curvature)) * this->stride());
+    ScratchField<S, Real> const local_x(team.team_scratch(0), 4 * v.max_locals);
+    ScratchField<S, Real> const local_p(team.team_scratch(0), after_step ? 4 * v.max_locals : 0);
+    ScratchField<S, Real> const slots(team.team_scratch(0), this->slot_numbers(numbers()));
     ScratchField<S, double> const energies(team.team_scratch(0), v.max_packs * Base::per_pack);
     this->load_relative(team, patch, x, local_x);
     if (after_step) this->load_relative(team, patch, p, local_p);
+    if (curvature == Curvature::none) {
+      this->template clear<3>(team, patch, slots);
+    } else if (curvature == Curvature::diagonal) {
+      this->template clear<6>(team, patch, slots);
+    } else {
+      this->template clear<9>(team, patch, slots);
+    }
+    bool const to_vertex = this->alone(team);
     team.team_barrier();
     auto const lame = Material::template cast<T>(materials(v.material(patch)));
     Kokkos::parallel_for(Kokkos::TeamThreadRange(team, this->groups(patch)), [&](int g) {
@@ -191,23 +237,28 @@ struct GradientSweep : PatchSweep<S, typename Precision::real> {
       for (int a = 0; a < 4; ++a) {
         Vec3<T> const b = shape_gradient(B, a);
         Vec3<T> const f = P * b;
-        for (int c = 0; c < 3; ++c) store(f[c], this->slot(slots, g, a, c));
-        if (curvature == Curvature::diagonal) {
+        if (curvature == Curvature::none) {
+          this->template give<3>(to_vertex, patch, g, a, {f[0], f[1], f[2]}, slots);
+        } else if (curvature == Curvature::diagonal) {
           Vec3<T> const d = weight * Material::diagonal(state, b);
-          for (int c = 0; c < 3; ++c) store(d[c], this->slot(slots, g, a, 3 + c));
-        } else if (curvature == Curvature::blocks) {
-          Sym3<T> const h = Material::block(state, b);
-          for (int c = 0; c < 6; ++c) store(T(weight * h.s[c]), this->slot(slots, g, a, 3 + c));
+          this->template give<6>(to_vertex, patch, g, a, {f[0], f[1], f[2], d[0], d[1], d[2]},
+                                 slots);
+        } else {
+          Sym3<T> h = Material::block(state, b);
+          for (T& entry : h.s) entry = weight * entry;
+          this->template give<9>(to_vertex, patch, g, a,
+                                 {f[0], f[1], f[2], h.s[0], h.s[1], h.s[2], h.s[3], h.s[4], h.s[5]},
+                                 slots);
         }
       }
     });
     team.team_barrier();
     if (curvature == Curvature::none) {
-      this->template gather_slots<3>(team, patch, slots, partial);
+      this->template take<3>(team, patch, slots, partial);
     } else if (curvature == Curvature::diagonal) {
-      this->template gather_slots<6>(team, patch, slots, partial);
+      this->template take<6>(team, patch, slots, partial);
     } else {
-      this->template gather_slots<9>(team, patch, slots, partial);
+      this->template take<9>(team, patch, slots, partial);
     }
     if (after_step) this->add_up(team, patch, energies, change);
   }
@@ -227,18 +278,20 @@ struct ProductSweep : PatchSweep<S, typename Precision::real> {
   Kokkos::View<Real*, typename S::memory> partial;
 
   std::size_t scratch_bytes() const {
-    return 2 * ScratchField<S, Real>::shmem_size(std::size_t(3) * this->patches.max_locals) +
-           ScratchField<S, Real>::shmem_size(3 * std::size_t(this->stride()));
+    return 2 * ScratchField<S, Real>::shmem_size(std::size_t(4) * this->patches.max_locals) +
+           ScratchField<S, Real>::shmem_size(this->slot_numbers(3));
   }
 
   KOKKOS_FUNCTION void operator()(typename S::team_member const& team) const {
     int const patch = team.league_rank();
     auto const& v = this->patches;
-    ScratchField<S, Real> const local_x(team.team_scratch(0), 3 * v.max_locals);
-    ScratchField<S, Real> const local_p(team.team_scratch(0), 3 * v.max_locals);
-    ScratchField<S, Real> const slots(team.team_scratch(0), 3 * this->stride());
+    ScratchField<S, Real> const local_x(team.team_scratch(0), 4 * v.max_locals);
+    ScratchField<S, Real> const local_p(team.team_scratch(0), 4 * v.max_locals);
+    ScratchField<S, Real> const slots(team.team_scratch(0), this->slot_numbers(3));
     this->load_relative(team, patch, x, local_x);
     this->load_relative(team, patch, p, local_p);
+    this->template clear<3>(team, patch, slots);
+    bool const to_vertex = this->alone(team);
     team.team_barrier();
     auto const lame = Material::template cast<T>(materials(v.material(patch)));
     Kokkos::parallel_for(Kokkos::TeamThreadRange(team, this->groups(patch)), [&](int g) {
@@ -248,11 +301,11 @@ struct ProductSweep : PatchSweep<S, typename Precision::real> {
                          Material::frame(state).apply(this->edges(patch, g, local_p) * B);
       for (int a = 0; a < 4; ++a) {
         Vec3<T> const f = dP * shape_gradient(B, a);
-        for (int c = 0; c < 3; ++c) store(f[c], this->slot(slots, g, a, c));
+        this->template give<3>(to_vertex, patch, g, a, {f[0], f[1], f[2]}, slots);
       }
     });
     team.team_barrier();
-    this->template gather_slots<3>(team, patch, slots, partial);
+    this->template take<3>(team, patch, slots, partial);
   }
 };
 
@@ -274,15 +327,15 @@ struct MeasureSweep : PatchSweep<S, typename Precision::real> {
 
   std::size_t scratch_bytes() const {
     auto const& v = this->patches;
-    return 2 * ScratchField<S, Real>::shmem_size(std::size_t(3) * v.max_locals) +
+    return 2 * ScratchField<S, Real>::shmem_size(std::size_t(4) * v.max_locals) +
            ScratchField<S, double>::shmem_size(std::size_t(v.max_packs) * Base::per_pack);
   }
 
   KOKKOS_FUNCTION void operator()(typename S::team_member const& team) const {
     int const patch = team.league_rank();
     auto const& v = this->patches;
-    ScratchField<S, Real> const local_x(team.team_scratch(0), 3 * v.max_locals);
-    ScratchField<S, Real> const local_p(team.team_scratch(0), 3 * v.max_locals);
+    ScratchField<S, Real> const local_x(team.team_scratch(0), 4 * v.max_locals);
+    ScratchField<S, Real> const local_p(team.team_scratch(0), 4 * v.max_locals);
     ScratchField<S, double> const energies(team.team_scratch(0), v.max_packs * Base::per_pack);
     this->load_relative(team, patch, x, local_x);
     if constexpr (measure != Measure::energy) this->load_relative(team, patch, p, local_p);
@@ -311,13 +364,60 @@ struct MeasureSweep : PatchSweep<S, typename Precision::real> {
   }
 };
 
-/// Smallest step along p at which an element of the patch reaches J = 0, in fp64. An element that
-/// is flat or inverted already allows no step if `strict`, and any step otherwise.
+/// A step along p that certainly inverts no element of the patch, found without roots: det (F + t
+/// dF) > 0 while t |F^-1 dF| < 1, and F^-1 dF = cof(F)' dF / J. Zero where an element is so flat
+/// that round-off counts.
+template <class S, class Precision>
+struct CertificateSweep : PatchSweep<S, typename Precision::real> {
+  using Real = typename Precision::real;
+  using Base = PatchSweep<S, Real>;
+  using T = typename Base::Value;
+
+  VectorField<typename Precision::position, S> x;
+  VectorField<Real, S> p;
+  Kokkos::View<Real*, typename S::memory> certified;
+
+  std::size_t scratch_bytes() const {
+    return 2 * ScratchField<S, Real>::shmem_size(std::size_t(4) * this->patches.max_locals);
+  }
+
+  KOKKOS_FUNCTION void operator()(typename S::team_member const& team, double& smallest) const {
+    int const patch = team.league_rank();
+    auto const& v = this->patches;
+    ScratchField<S, Real> const local_x(team.team_scratch(0), 4 * v.max_locals);
+    ScratchField<S, Real> const local_p(team.team_scratch(0), 4 * v.max_locals);
+    this->load_relative(team, patch, x, local_x);
+    this->load_relative(team, patch, p, local_p);
+    team.team_barrier();
+    Real best = Kokkos::Experimental::finite_max_v<Real>;
+    Kokkos::parallel_reduce(
+        Kokkos::TeamThreadRange(team, this->groups(patch)),
+        [&](int g, Real& least) {
+          Mat3<T> const B = this->inverse_rest(patch, g);
+          Mat3<T> const F = this->edges(patch, g, local_x) * B;
+          Mat3<T> const C = cofactor(F), G = transpose_times(C, this->edges(patch, g, local_p) * B);
+          T const J = dot(F.column(0), C.column(0)), I2 = contract(F, F);
+          T const length = T(Real(0.9)) * J / (sqrt(contract(G, G)) + T(Real(1e-30)));
+          least = Kokkos::min(least,
+                              min_lanes(select(J > T(Real(1e-4)) * I2 * sqrt(I2), length, T(0))));
+        },
+        Kokkos::Min<Real>(best));
+    Kokkos::single(Kokkos::PerTeam(team), [&]() {
+      certified(patch) = best;
+      smallest = Kokkos::min(smallest, double(best));
+    });
+  }
+};
+
+/// Smallest step along p up to `at_most` at which an element of the patch reaches J = 0, in fp64.
+/// An element that is flat or inverted already allows no step if `strict`, and any otherwise.
 template <class S, class Precision>
 struct InversionSweep {
   PatchViews<S, typename Precision::real> patches;
   VectorField<typename Precision::position, S> x;
   VectorField<typename Precision::real, S> p;
+  Kokkos::View<typename Precision::real*, typename S::memory> certified;
+  double at_most;
   bool strict;
 
   template <class Field>
@@ -332,7 +432,7 @@ struct InversionSweep {
     std::uint16_t const* corner =
         patches.corner.data() + std::size_t(e / lanes) * 4 * lanes + e % lanes;
     int v[4];
-    for (int a = 0; a < 4; ++a) v[a] = vertex[corner[a * lanes]];
+    for (int a = 0; a < 4; ++a) v[a] = vertex[corner[a * lanes] / 4];
     Mat3<double> D, d;
     double motion = 0;
     for (int a = 0; a < 3; ++a) {
@@ -357,6 +457,7 @@ struct InversionSweep {
   KOKKOS_FUNCTION void operator()(typename S::team_member const& team, double& smallest) const {
     constexpr int lanes = PatchViews<S, typename Precision::real>::lanes;
     int const patch = team.league_rank();
+    if (double(certified(patch)) >= at_most) return;
     int const* vertex = patches.vertex.data() + patches.local_begin(patch);
     double best = smallest;
     Kokkos::parallel_reduce(
@@ -413,7 +514,7 @@ struct AssembleColour {
       double const weight = scale * double(rest[9 * lanes]);
       if (weight == 0) continue;  // padding
       int v[4];
-      for (int a = 0; a < 4; ++a) v[a] = vertex[corner[a * lanes]];
+      for (int a = 0; a < 4; ++a) v[a] = vertex[corner[a * lanes] / 4];
       Mat3<double> B, D;
       for (int k = 0; k < 9; ++k) B.a[k] = double(rest[k * lanes]);
       for (int j = 0; j < 3; ++j)

@@ -6,6 +6,7 @@
 #include <taut/core/fem/rest_shape.hpp>
 #include <taut/core/potential/term.hpp>
 
+#include <algorithm>
 #include <limits>
 
 namespace taut {
@@ -49,6 +50,7 @@ public:
     vertices_.reserve(4 * rest.tets.size());
     for (Tet const& tet : rest.tets) vertices_.insert(vertices_.end(), tet.begin(), tet.end());
     reducer_ = Reducer<Space, Sum>::of_partials(patches_.count);
+    certified_ = Scratch("elastic_certified", patches_.count);
   }
 
   ElasticTets(TetMesh const& rest, MaterialParameters const& material, SweepParams const& p = {})
@@ -108,15 +110,15 @@ public:
     }
   }
 
-  double max_step(Positions const& x, Vectors const& p) const {
+  double max_step(Positions const& x, Vectors const& p, double at_most) const {
     if constexpr (Material::allows_inversion) {
-      return std::numeric_limits<double>::infinity();
+      return at_most;
     } else {
-      return step_to_inversion(x, p, true);
+      return step_to_inversion(x, p, at_most, true);
     }
   }
-  double max_prescribed_step(Positions const& x, Vectors const& p) const {
-    return step_to_inversion(x, p, !Material::allows_inversion);
+  double max_prescribed_step(Positions const& x, Vectors const& p, double at_most) const {
+    return step_to_inversion(x, p, at_most, !Material::allows_inversion);
   }
 
   int elements(std::vector<int>& vertices) const {
@@ -152,15 +154,23 @@ private:
     return partial_;
   }
 
-  double step_to_inversion(Positions const& x, Vectors const& p, bool strict) const {
-    double smallest = std::numeric_limits<double>::infinity();
-    if (patches_.count == 0) return smallest;
-    Kokkos::parallel_reduce("elastic_max_step", policy(0),
-                            kernels::InversionSweep<Space, Precision>{patches_, x, p, strict},
+  /// The cheap sweep clears nearly all patches; the exact one looks at those that it cannot.
+  double step_to_inversion(Positions const& x, Vectors const& p, double at_most,
+                           bool strict) const {
+    if (patches_.count == 0) return at_most;
+    using Certificate = kernels::CertificateSweep<Space, Precision>;
+    Certificate const certificate{{patches_}, x, p, certified_};
+    double smallest = at_most;
+    Kokkos::parallel_reduce("elastic_certificate", policy(certificate.scratch_bytes()), certificate,
                             Kokkos::Min<double>(smallest));
-    // The largest finite number is Kokkos' identity of the minimum.
-    return smallest < std::numeric_limits<double>::max() ? smallest
-                                                         : std::numeric_limits<double>::infinity();
+    if (smallest >= at_most) return at_most;
+    smallest = at_most;
+    Kokkos::parallel_reduce(
+        "elastic_max_step", policy(0),
+        kernels::InversionSweep<Space, Precision>{patches_, x, p, certified_, at_most, strict},
+        Kokkos::Min<double>(smallest));
+    // Kokkos' identity of the minimum is the largest finite number.
+    return smallest < std::numeric_limits<double>::max() ? std::min(smallest, at_most) : at_most;
   }
 
   template <kernels::Measure what>
@@ -209,6 +219,7 @@ private:
   std::vector<int> vertices_;
   Reducer<Space, Sum> reducer_;
   mutable Scratch partial_;
+  Scratch certified_;  ///< per patch, see CertificateSweep
 };
 
 }  // namespace taut

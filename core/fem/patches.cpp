@@ -77,19 +77,16 @@ Patches make_patches(std::span<Tet const> tets, std::span<int const> material, i
           p.vertex.push_back(v);
         }
         int const slot = (e / lanes * 4 + a) * lanes + e % lanes;
-        p.corner[std::size_t(pack0) * 4 * lanes + slot] = static_cast<std::uint16_t>(local_of[v]);
+        p.corner[std::size_t(pack0) * 4 * lanes + slot] = static_cast<std::uint16_t>(4 * local_of[v]);
         if (!padding) slot_vertex[slot] = local_of[v];
       }
     }
     int const locals = static_cast<int>(p.vertex.size()) - local0;
-    // Incidence in element order, so that a sum over it equals a serial scatter over the elements.
+    // Incidence in the order of the slots, so that a sum over it equals a serial scatter.
     std::vector<std::vector<std::uint16_t>> slots(locals);
-    for (int e = 0; e < packs * lanes; ++e) {
-      for (int a = 0; a < 4; ++a) {
-        int const slot = (e / lanes * 4 + a) * lanes + e % lanes;
-        if (slot_vertex[slot] >= 0) {
-          slots[slot_vertex[slot]].push_back(static_cast<std::uint16_t>(slot));
-        }
+    for (std::size_t slot = 0; slot < slot_vertex.size(); ++slot) {
+      if (slot_vertex[slot] >= 0) {
+        slots[slot_vertex[slot]].push_back(static_cast<std::uint16_t>(slot));
       }
     }
     for (auto const& s : slots) {

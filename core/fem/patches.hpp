@@ -28,7 +28,7 @@ struct Patches {
   std::vector<int> vertex;                ///< per local vertex: vertex of the mesh
   std::vector<int> tet;                   ///< per element: index into the list
   std::vector<char> padding;              ///< per element: 1 for a padding copy
-  std::vector<std::uint16_t> corner;      ///< [pack][corner][lane]: local vertex within its patch
+  std::vector<std::uint16_t> corner;      ///< [pack][corner][lane]: 4 x local vertex in its patch
   std::vector<int> incidence_begin;       ///< per local vertex, +1
   std::vector<std::uint16_t> incidence;   ///< slot (pack within patch * 4 + corner) * lanes + lane
   std::vector<int> occurrence_begin;      ///< per vertex of the mesh, +1

@@ -61,11 +61,13 @@ public:
   void add_to(Matrix const& matrix, Positions const& x, double scale, Fixed const& fixed) const {
     for (auto const& t : terms_) t->add_to(matrix, x, scale, fixed);
   }
-  double max_step(Positions const& x, Vectors const& p) const {
-    return smallest([&](auto const& t) { return t.max_step(x, p); });
+  double max_step(Positions const& x, Vectors const& p, double at_most) const {
+    for (auto const& t : terms_) at_most = t->max_step(x, p, at_most);
+    return at_most;
   }
-  double max_prescribed_step(Positions const& x, Vectors const& p) const {
-    return smallest([&](auto const& t) { return t.max_prescribed_step(x, p); });
+  double max_prescribed_step(Positions const& x, Vectors const& p, double at_most) const {
+    for (auto const& t : terms_) at_most = t->max_prescribed_step(x, p, at_most);
+    return at_most;
   }
   /// All terms must have elements of equal length.
   int elements(std::vector<int>& vertices) const {
@@ -94,8 +96,8 @@ private:
     virtual void add_product(Positions const&, Vectors const&, double, Fixed const&,
                              Vectors const&) const = 0;
     virtual void add_to(Matrix const&, Positions const&, double, Fixed const&) const = 0;
-    virtual double max_step(Positions const&, Vectors const&) const = 0;
-    virtual double max_prescribed_step(Positions const&, Vectors const&) const = 0;
+    virtual double max_step(Positions const&, Vectors const&, double) const = 0;
+    virtual double max_prescribed_step(Positions const&, Vectors const&, double) const = 0;
     virtual int elements(std::vector<int>&) const = 0;
   };
 
@@ -141,11 +143,12 @@ private:
     void add_to(Matrix const& m, Positions const& x, double h, Fixed const& f) const override {
       term.add_to(m, x, h, f);
     }
-    double max_step(Positions const& x, Vectors const& p) const override {
-      return term.max_step(x, p);
+    double max_step(Positions const& x, Vectors const& p, double at_most) const override {
+      return term.max_step(x, p, at_most);
     }
-    double max_prescribed_step(Positions const& x, Vectors const& p) const override {
-      return term.max_prescribed_step(x, p);
+    double max_prescribed_step(Positions const& x, Vectors const& p,
+                               double at_most) const override {
+      return term.max_prescribed_step(x, p, at_most);
     }
     int elements(std::vector<int>& v) const override { return term.elements(v); }
   };
@@ -155,12 +158,6 @@ private:
     double sum = 0;
     for (auto const& t : terms_) sum += part(*t);
     return sum;
-  }
-  template <class Part>
-  double smallest(Part const& part) const {
-    double least = std::numeric_limits<double>::infinity();
-    for (auto const& t : terms_) least = std::min(least, part(*t));
-    return least;
   }
 
   std::vector<std::shared_ptr<Interface const>> terms_;

@@ -30,7 +30,7 @@ concept Objective =
     requires(E& e, VectorField<typename E::Precision::position, typename E::Space> const& x,
              VectorField<typename E::Precision::real, typename E::Space> const& p,
              BlockField<typename E::Precision::real, typename E::Space> const& blocks,
-             BlockCsr<typename E::Space, double>& matrix, double alpha) {
+             BlockCsr<typename E::Space, double>& matrix, double alpha, double at_most) {
   typename E::Space;
   typename E::Precision;
   { e.size() } -> std::convertible_to<int>;
@@ -59,9 +59,10 @@ concept Objective =
   /// H(x), with the curvature projected exactly, into a matrix made by `pattern()`.
   { e.pattern() } -> std::same_as<BlockCsr<typename E::Space, double>>;
   {e.assemble(x, matrix)};
-  /// Largest alpha in (0, infinity] such that x + a p is valid for all a < alpha (an element that
-  /// forbids inversion reaches J = 0 there); infinity when nothing limits the step.
-  { e.max_step(x, p) } -> std::convertible_to<double>;
+  /// Largest alpha in (0, at_most] such that x + a p is valid for all a < alpha (an element that
+  /// forbids inversion reaches J = 0 there). Proving a step as long as one wants valid is much
+  /// cheaper than finding the longest one (at_most = infinity).
+  { e.max_step(x, p, at_most) } -> std::convertible_to<double>;
   /// Moves fixed unknowns on towards where they are prescribed to be, as far as is valid; true if x
   /// changed, after which gradient and energy must be evaluated anew. False once all have arrived.
   { e.advance_prescribed(x) } -> std::convertible_to<bool>;

@@ -345,20 +345,15 @@ public:
     for_each_swept([&](auto const& term) { term.add_to(matrix, x, scale_, unknowns_.fixed); });
   }
 
-  double max_step(Positions const& x, Vectors const& p) const {
-    double smallest = std::numeric_limits<double>::infinity();
-    for_each_swept(
-        [&](auto const& term) { smallest = Kokkos::min(smallest, term.max_step(x, p)); });
-    return smallest;
+  double max_step(Positions const& x, Vectors const& p, double at_most) const {
+    for_each_swept([&](auto const& term) { at_most = term.max_step(x, p, at_most); });
+    return at_most;
   }
 
   /// As `max_step`, for motion that is prescribed: no element may fold, whatever its material.
-  double max_prescribed_step(Positions const& x, Vectors const& p) const {
-    double smallest = std::numeric_limits<double>::infinity();
-    for_each_swept([&](auto const& term) {
-      smallest = Kokkos::min(smallest, term.max_prescribed_step(x, p));
-    });
-    return smallest;
+  double max_prescribed_step(Positions const& x, Vectors const& p, double at_most) const {
+    for_each_swept([&](auto const& term) { at_most = term.max_prescribed_step(x, p, at_most); });
+    return at_most;
   }
 
   /// Moves free unknowns by one Newton step on the local terms alone: from x + h v to the predictor
@@ -380,10 +375,11 @@ public:
     if (distance == 0) return false;
     // Materials that tolerate inversion may have to fold (a push faster than sound): there the
     // motion is not held up for ever.
-    double const allowed = 0.2 * max_step(x, direction_);
+    constexpr double stride = 0.2;
+    double const allowed = stride * max_step(x, direction_, 1 / stride);
     double const patience = distance < 1e-3 * unknowns_.length ? 1.0 : 0.125;
-    double const fraction = Kokkos::min(
-        1.0, Kokkos::max(0.2 * max_prescribed_step(x, direction_), Kokkos::min(patience, allowed)));
+    double const unfolded = stride * max_prescribed_step(x, direction_, 1 / stride);
+    double const fraction = Kokkos::min(1.0, Kokkos::max(unfolded, Kokkos::min(patience, allowed)));
     if (!(fraction * distance > 1e-12 * unknowns_.length) && fraction < 1) {
       throw Error(
           "the prescribed motion folds an element that is already flat: reduce the motion per step "

@@ -215,11 +215,9 @@ public:
                     kernels::StencilAssemble<Kernel, Space, Precision>{data(x, Vectors()), fixed,
                                                                        matrix, scale});
   }
-  double max_step(Positions const&, Vectors const&) const {
-    return std::numeric_limits<double>::infinity();
-  }
-  double max_prescribed_step(Positions const&, Vectors const&) const {
-    return std::numeric_limits<double>::infinity();
+  double max_step(Positions const&, Vectors const&, double at_most) const { return at_most; }
+  double max_prescribed_step(Positions const&, Vectors const&, double at_most) const {
+    return at_most;
   }
   int elements(std::vector<int>& vertices) const {
     vertices.insert(vertices.end(), vertices_.begin(), vertices_.end());

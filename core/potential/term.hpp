@@ -44,7 +44,7 @@ concept SweptTerm = requires(
     VectorField<typename Term::Precision::real, typename Term::Space> p,
     BlockField<typename Term::Precision::real, typename Term::Space> blocks,
     BlockCsr<typename Term::Space, double> matrix, FixedMask<typename Term::Space> fixed,
-    double alpha, double scale, std::vector<int>& vertices) {
+    double alpha, double scale, double at_most, std::vector<int>& vertices) {
   { term.value(x, scale) } -> std::convertible_to<double>;
   /// E(x + alpha p) - E(x)
   { term.change(x, p, alpha, scale) } -> std::convertible_to<double>;
@@ -58,10 +58,10 @@ concept SweptTerm = requires(
   { term.quadratic_form(x, p, scale) } -> std::convertible_to<double>;
   {term.add_product(x, p, scale, fixed, p)};
   {term.add_to(matrix, x, scale, fixed)};
-  /// Largest valid step along p; infinity if nothing limits it.
-  { term.max_step(x, p) } -> std::convertible_to<double>;
+  /// Largest valid step along p up to `at_most`, which may be infinity.
+  { term.max_step(x, p, at_most) } -> std::convertible_to<double>;
   /// The same as seen by prescribed motion, which may never fold the mesh (whatever the material).
-  { term.max_prescribed_step(x, p) } -> std::convertible_to<double>;
+  { term.max_prescribed_step(x, p, at_most) } -> std::convertible_to<double>;
   /// Vertex lists of equal length for the sparsity pattern: appends them and returns the length.
   { term.elements(vertices) } -> std::convertible_to<int>;
 };

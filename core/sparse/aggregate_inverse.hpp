@@ -139,7 +139,9 @@ struct ApplyAggregate {
   VectorField<R, S> r, z;
   int run;
 
-  KOKKOS_FUNCTION std::size_t scratch_size() const { return sizeof(Storage) * std::size_t(6 * run); }
+  KOKKOS_FUNCTION std::size_t scratch_size() const {
+    return sizeof(Storage) * std::size_t(6 * run);
+  }
 
   KOKKOS_FUNCTION void operator()(typename S::team_member const& team) const {
     int const rows = 3 * run, first = run * team.league_rank();

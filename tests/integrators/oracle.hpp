@@ -56,7 +56,7 @@ typename Chain<Bond>::Positions minimum(Chain<Bond> const& chain,
         largest = std::max(largest, std::abs(step[i][c]));
       }
     }
-    double alpha = std::min(1.0, 0.9 * chain.max_step(at, p));
+    double alpha = std::min(1.0, 0.9 * chain.max_step(at, p, 2.0));
     while (largest > 1e-8 && chain.difference(at, p, alpha) > 0) alpha /= 2;
     for (int i = 0; i < n; ++i)
       for (int c = 0; c < 3; ++c) at(i, c) += alpha * p(i, c);

@@ -97,7 +97,7 @@ TEST_CASE("the displacement clamp of the paper") {
 TEST_CASE("no step leaves more than the asked fraction of what is valid") {
   Setting<toy::Barrier> s;
   auto line = s.line();
-  double const valid = s.chain.max_step(s.x, s.fields.direction);
+  double const valid = s.chain.max_step(s.x, s.fields.direction, toy::infinity);
   REQUIRE(10 * valid < 1e3);
   Step const step = SufficientDecrease({.bound = {.fraction = 0.3}})(line, 10 * valid);
   CHECK(step.cut);
@@ -172,7 +172,7 @@ TEST_CASE("the exact line search finds the minimum along the line") {
     auto line = s.line();
     Step const step = ExactLineSearch({.bound = {.fraction = 0.999}})(line, 0);
     CHECK(step.found);
-    CHECK(step.length < s.chain.max_step(s.chain.start(), s.fields.direction));
+    CHECK(step.length < s.chain.max_step(s.chain.start(), s.fields.direction, toy::infinity));
     CHECK((step.cut || std::abs(s.slope_ratio()) < 1e-9));
   }
 }

@@ -378,8 +378,8 @@ public:
                 ChainAssemble<Data, BlockCsr<S, double>>{data_, x, matrix});
   }
 
-  double max_step(Positions const& x, Field const& p) const {
-    return minimum<S>("chain_max_step", size() - 1, infinity, ChainMaxStep<Data>{data_, x, p});
+  double max_step(Positions const& x, Field const& p, double at_most) const {
+    return minimum<S>("chain_max_step", size() - 1, at_most, ChainMaxStep<Data>{data_, x, p});
   }
   bool advance_prescribed(Positions const& x) {
     if (pieces_left_ == 0) return false;
