@@ -77,7 +77,8 @@ Patches make_patches(std::span<Tet const> tets, std::span<int const> material, i
           p.vertex.push_back(v);
         }
         int const slot = (e / lanes * 4 + a) * lanes + e % lanes;
-        p.corner[std::size_t(pack0) * 4 * lanes + slot] = static_cast<std::uint16_t>(4 * local_of[v]);
+        p.corner[std::size_t(pack0) * 4 * lanes + slot] =
+            static_cast<std::uint16_t>(4 * local_of[v]);
         if (!padding) slot_vertex[slot] = local_of[v];
       }
     }
