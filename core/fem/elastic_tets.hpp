@@ -3,8 +3,10 @@
 
 #include <taut/core/fem/elastic_kernels.hpp>
 #include <taut/core/fem/element_material.hpp>
+#include <taut/core/fem/inversion_sweeps.hpp>
 #include <taut/core/fem/rest_shape.hpp>
 #include <taut/core/potential/term.hpp>
+#include <taut/core/report/error.hpp>
 
 #include <algorithm>
 #include <limits>
@@ -31,10 +33,12 @@ public:
   static constexpr int lanes = PatchViews<Space, Real>::lanes;
 
   /// `rest`: the mesh at rest, tets and vertices in the solver's order (see ordering.hpp), all or
-  /// some tets of a scene. `material_of_tet[t]` indexes `materials`.
+  /// some tets of a scene. `material_of_tet[t]` indexes `materials`. Throws Error if an index is
+  /// out of range.
   ElasticTets(TetMesh const& rest, std::vector<MaterialParameters> const& materials,
               std::vector<int> const& material_of_tet, SweepParams const& params = {})
       : params_(params), materials_(to_space<Space>("materials", materials)) {
+    check_indices(rest, materials.size(), material_of_tet);
     Patches const host = make_patches(
         rest.tets, material_of_tet, static_cast<int>(rest.points.size()), lanes, params.patch_size);
     std::vector<double> shapes(10 * host.tet.size());
@@ -130,6 +134,22 @@ private:
   using Sum = typename Precision::sum;
   using Scratch = Kokkos::View<Real*, typename Space::memory>;
 
+  static void check_indices(TetMesh const& rest, std::size_t materials,
+                            std::vector<int> const& material_of_tet) {
+    if (material_of_tet.size() != rest.tets.size())
+      throw Error("ElasticTets: {} tets but {} entries in material_of_tet", rest.tets.size(),
+                  material_of_tet.size());
+    for (std::size_t t = 0; t < rest.tets.size(); ++t) {
+      int const m = material_of_tet[t];
+      if (m < 0 || std::size_t(m) >= materials)
+        throw Error("ElasticTets: tet {} has material {} of {}", t, m, materials);
+      for (int v : rest.tets[t]) {
+        if (v < 0 || std::size_t(v) >= rest.points.size())
+          throw Error("ElasticTets: tet {} has vertex {} of {}", t, v, rest.points.size());
+      }
+    }
+  }
+
   typename Space::team_policy policy(std::size_t scratch_bytes) const {
     int const team = params_.team_size > 0 ? params_.team_size : (Space::on_host ? 1 : 128);
     typename Space::team_policy p(patches_.count, team);
@@ -204,7 +224,11 @@ private:
   void gather(Scratch const& from, FixedMask<Space> const& fixed, Vectors const& g,
               CurvatureField const& c) const {
     using Kernel = kernels::GatherVertices<Space, Real, curvature_numbers, CurvatureField>;
-    for_each<Space>("elastic_gather", static_cast<int>(fixed.extent(0)),
+    std::size_t const vertices = patches_.occurrence_begin.extent(0) - 1;
+    if (fixed.extent(0) != vertices)
+      throw Error("ElasticTets: the mesh has {} vertices, the potential {} unknowns", vertices,
+                  fixed.extent(0));
+    for_each<Space>("elastic_gather", static_cast<int>(vertices),
                     Kernel{patches_, from, fixed, g, c});
   }
 

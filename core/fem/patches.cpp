@@ -1,4 +1,5 @@
 #include <taut/core/fem/patches.hpp>
+#include <taut/core/report/error.hpp>
 
 #include <algorithm>
 
@@ -51,6 +52,10 @@ std::vector<std::vector<int>> colour(Patches const& p) {
 
 Patches make_patches(std::span<Tet const> tets, std::span<int const> material, int vertices,
                      int lanes, int patch_size) {
+  // Corners are stored as 4 x local vertex in 16 bits, and a tet has at most four vertices.
+  constexpr int most = 4096;
+  if (patch_size < 1 || patch_size > most)
+    throw Error("a patch of {} tets: choose patch_size from 1 to {}", patch_size, most);
   Patches p;
   p.lanes = lanes;
   p.pack_begin = {0};
@@ -66,8 +71,11 @@ Patches make_patches(std::span<Tet const> tets, std::span<int const> material, i
     p.corner.resize(std::size_t(pack0 + packs) * 4 * lanes);
     std::vector<int> slot_vertex(std::size_t(packs) * 4 * lanes, -1);
     for (int e = 0; e < packs * lanes; ++e) {
-      int const t = std::min(first + e, last - 1);
-      bool const padding = first + e >= last;
+      // Lanes of a pack come from places far apart in the patch: neighbours share vertices, and
+      // adding to a vertex twice in a row waits for the first sum.
+      int const at = first + e % lanes * packs + e / lanes;
+      int const t = std::min(at, last - 1);
+      bool const padding = at >= last;
       p.tet.push_back(t);
       p.padding.push_back(padding);
       for (int a = 0; a < 4; ++a) {

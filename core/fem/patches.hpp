@@ -18,8 +18,8 @@
 
 namespace taut {
 
-/// The patches of a list of tets, on the host. Element e of pack k sits in lane e; the tail of a
-/// patch is padded with copies of its last tet, which have no weight and no incidence.
+/// The patches of a list of tets, on the host. A patch of n packs gives lane l of its pack k the
+/// tet l n + k; where there is none, a copy of the last one, which has no weight and no incidence.
 struct Patches {
   int lanes = 1;                          ///< elements per pack
   std::vector<int> pack_begin;            ///< per patch, +1: its packs
@@ -40,7 +40,8 @@ struct Patches {
 };
 
 /// `tets` in locality-preserving order, with vertices below `vertices`; `material[t]` of each. A
-/// patch holds up to `patch_size` tets of one material.
+/// patch holds up to `patch_size` tets of one material. Throws Error unless patch_size is 1 to
+/// 4096.
 Patches make_patches(std::span<Tet const> tets, std::span<int const> material, int vertices,
                      int lanes, int patch_size);
 

@@ -1,0 +1,173 @@
+// The frame of a sweep over patches (see patches.hpp): what a team does with a patch, whatever it
+// computes for the elements. On the host a thread computes a SIMD pack of elements at a time, on a
+// device one element.
+#pragma once
+
+#include <taut/core/exec/parallel.hpp>
+#include <taut/core/fem/patches.hpp>
+#include <taut/core/math/matrix.hpp>
+#include <taut/core/math/rows.hpp>
+
+namespace taut::kernels {
+
+template <class S, class Real>
+using ScratchField = Kokkos::View<Real*, typename S::execution::scratch_memory_space,
+                                  Kokkos::MemoryTraits<Kokkos::Unmanaged>>;
+
+/// A patch in the hands of a team: its vertex data in fast memory and its elements one pack at a
+/// time.
+template <class S, class Real>
+struct PatchSweep {
+  /// What one thread computes at a time.
+  using Value = std::conditional_t<S::on_host, HostPack<Real>, Real>;
+  static constexpr int width = ScalarTraits<Value>::lanes;
+  static constexpr int lanes = PatchViews<S, Real>::lanes;
+  static constexpr int per_pack = lanes / width;  ///< groups in a pack
+
+  PatchViews<S, Real> patches;
+
+  KOKKOS_FORCEINLINE_FUNCTION int locals(int patch) const {
+    return patches.local_begin(patch + 1) - patches.local_begin(patch);
+  }
+  /// Groups of `width` elements.
+  KOKKOS_FORCEINLINE_FUNCTION int groups(int patch) const {
+    return (patches.pack_begin(patch + 1) - patches.pack_begin(patch)) * per_pack;
+  }
+
+  /// Copies field values of the patch's vertices, less those of its first vertex, in the precision
+  /// of the field, in rows of four.
+  template <class Team, class Field>
+  KOKKOS_FORCEINLINE_FUNCTION void load_relative(Team const& team, int patch, Field const& field,
+                                                 ScratchField<S, Real> const& to) const {
+    int const first = patches.local_begin(patch);
+    int const origin = patches.vertex(first);
+    Kokkos::parallel_for(Kokkos::TeamThreadRange(team, locals(patch)), [&](int l) {
+      int const v = patches.vertex(first + l);
+      for (int c = 0; c < 3; ++c) {
+        to(4 * l + c) = static_cast<Real>(field(v, c) - field(origin, c));
+      }
+      to(4 * l + 3) = 0;
+    });
+  }
+
+  /// Edge matrix of group `g`: differences to its first corner.
+  KOKKOS_FORCEINLINE_FUNCTION Mat3<Value> edges(int patch, int g,
+                                                ScratchField<S, Real> const& field) const {
+    std::uint16_t const* corner = corners(patch, g);
+    Mat3<Value> d;
+    Value origin[3], end[3];
+    load_rows(field.data(), corner, origin);
+    for (int a = 1; a < 4; ++a) {
+      load_rows(field.data(), corner + a * lanes, end);
+      for (int c = 0; c < 3; ++c) d(c, a - 1) = end[c] - origin[c];
+    }
+    return d;
+  }
+
+  KOKKOS_FORCEINLINE_FUNCTION Mat3<Value> inverse_rest(int patch, int g) const {
+    Real const* from = rest(patch, g);
+    auto const entry = [&](int k) { return load<Value>(from + k * lanes); };
+    return {
+        {entry(0), entry(1), entry(2), entry(3), entry(4), entry(5), entry(6), entry(7), entry(8)}};
+  }
+  KOKKOS_FORCEINLINE_FUNCTION Value volume(int patch, int g) const {
+    return load<Value>(rest(patch, g) + 9 * lanes);
+  }
+
+  /// Whether one thread does the whole patch: then it adds to the vertices as it goes, which needs
+  /// little memory. Several leave what each corner receives in slots, and add up those of a vertex
+  /// when all are there. Both add in the order of the slots: corner by corner within a pack.
+  template <class Team>
+  KOKKOS_FORCEINLINE_FUNCTION static bool alone(Team const& team) {
+    return S::on_host && team.team_size() == 1;
+  }
+  /// Size of the field that `give` works on, for `numbers` per corner.
+  KOKKOS_FORCEINLINE_FUNCTION std::size_t slot_numbers(int numbers) const {
+    return Kokkos::max(numbers * stride(), patches.max_locals * padded(numbers));
+  }
+  template <int numbers, class Team>
+  KOKKOS_FORCEINLINE_FUNCTION void clear(Team const& team, int patch,
+                                         ScratchField<S, Real> const& slots) const {
+    if (!alone(team)) return;
+    for (int k = 0; k < padded(numbers) * locals(patch); ++k) slots(k) = 0;
+  }
+  /// Hands over what corner `a` of group g receives.
+  template <int numbers>
+  KOKKOS_FORCEINLINE_FUNCTION void give(bool to_vertex, int patch, int g, int a,
+                                        Value const (&received)[numbers],
+                                        ScratchField<S, Real> const& slots) const {
+    if (S::on_host && to_vertex) {
+      constexpr int rows = padded(numbers) / 4;
+      std::uint16_t const* corner = corners(patch, g) + a * lanes;
+      add_rows<Kokkos::min(numbers, 4), rows>(received, slots.data(), corner);
+      if constexpr (rows > 1)
+        add_rows<Kokkos::min(numbers - 4, 4), rows>(received + 4, slots.data() + 4, corner);
+      if constexpr (rows > 2) add_rows<numbers - 8, rows>(received + 8, slots.data() + 8, corner);
+    } else {
+      // [number][pack][corner][lane]
+      Real* const slot = slots.data() + (g / per_pack * 4 + a) * lanes + g % per_pack * width;
+      for (int c = 0; c < numbers; ++c) store(received[c], slot + c * stride());
+    }
+  }
+  /// Writes the sum of each local vertex to its row of `partial`.
+  template <int numbers, class Team, class Partial>
+  KOKKOS_FORCEINLINE_FUNCTION void take(Team const& team, int patch,
+                                        ScratchField<S, Real> const& slots,
+                                        Partial const& partial) const {
+    int const first = patches.local_begin(patch), step = stride();
+    bool const added = alone(team);
+    Kokkos::parallel_for(Kokkos::TeamThreadRange(team, locals(patch)), [&](int l) {
+      Real sum[numbers] = {};
+      if (added) {
+        for (int c = 0; c < numbers; ++c) sum[c] = slots(padded(numbers) * l + c);
+      } else {
+        int const last = patches.incidence_begin(first + l + 1);
+        for (int k = patches.incidence_begin(first + l); k < last; ++k) {
+          Real const* from = slots.data() + patches.incidence(k);
+          for (int c = 0; c < numbers; ++c) sum[c] += from[c * step];
+        }
+      }
+      for (int c = 0; c < numbers; ++c) partial(numbers * (first + l) + c) = sum[c];
+    });
+  }
+
+  /// Adds up one number per group, in order, into the patch's entry of `total`.
+  template <class Team, class Energies, class Total>
+  KOKKOS_FORCEINLINE_FUNCTION void add_up(Team const& team, int patch, Energies const& per_group,
+                                          Total const& total) const {
+    Kokkos::single(Kokkos::PerTeam(team), [&]() {
+      double sum = 0;
+      for (int g = 0; g < groups(patch); ++g) sum += per_group(g);
+      total(patch) = static_cast<typename Total::value_type>(sum);
+    });
+  }
+
+private:
+  /// Numbers in the rows of four that hold `numbers`.
+  KOKKOS_FORCEINLINE_FUNCTION static constexpr int padded(int numbers) {
+    return (numbers + 3) / 4 * 4;
+  }
+  /// Distance between two numbers of a slot: one slot per corner, and an odd number of cache lines
+  /// so that the numbers of one slot do not fall into the same cache set.
+  KOKKOS_FORCEINLINE_FUNCTION int stride() const { return patches.max_packs * 4 * lanes + 16; }
+  KOKKOS_FORCEINLINE_FUNCTION std::uint16_t const* corners(int patch, int g) const {
+    return patches.corner.data() +
+           std::size_t(patches.pack_begin(patch) + g / per_pack) * 4 * lanes + g % per_pack * width;
+  }
+  KOKKOS_FORCEINLINE_FUNCTION Real const* rest(int patch, int g) const {
+    return patches.rest.data() +
+           std::size_t(patches.pack_begin(patch) + g / per_pack) * 10 * lanes +
+           g % per_pack * width;
+  }
+};
+
+/// Row a of B (a = 1, 2, 3) or minus their sum (a = 0): the gradient of shape function a.
+template <class T>
+KOKKOS_FORCEINLINE_FUNCTION Vec3<T> shape_gradient(Mat3<T> const& B, int a) {
+  if (a > 0) return {B(a - 1, 0), B(a - 1, 1), B(a - 1, 2)};
+  Vec3<T> b;
+  for (int c = 0; c < 3; ++c) b[c] = -(B(0, c) + B(1, c) + B(2, c));
+  return b;
+}
+
+}  // namespace taut::kernels

@@ -1,0 +1,139 @@
+// How far a step may go before an element inverts: the sweeps against the root of each element's
+// cubic, for slivers, crushed elements, elements far from the origin of their patch and either
+// numbering, in every precision.
+#include "elastic_oracle.hpp"
+
+#include <taut/core/fem/elastic_tets.hpp>
+#include <taut/core/math/cubic.hpp>
+#include <taut/core/report/error.hpp>
+#include <taut/materials/elastic.hpp>
+#include <taut/materials/neo_hookean.hpp>
+
+#include <catch2/catch_template_test_macros.hpp>
+#include <catch2/catch_test_macros.hpp>
+
+#include <cmath>
+#include <random>
+
+using namespace taut;
+
+namespace {
+
+using Host = Space<Kokkos::DefaultHostExecutionSpace>;
+constexpr double infinity = std::numeric_limits<double>::infinity();
+
+/// Separate tets along a line of a given length, each with its own start and direction.
+struct Crowd {
+  TetMesh rest;
+  std::vector<Point> x, p;
+};
+
+/// `flatness`: heights are 10^-u with u up to this, at rest (`thin_rest`) or only in x.
+Crowd crowd(int tets, double length, double flatness, bool thin_rest, bool mirrored,
+            unsigned seed) {
+  std::mt19937 engine(seed);
+  std::uniform_real_distribution<double> unit(0, 1);
+  Crowd c;
+  for (int t = 0; t < tets; ++t) {
+    double const at = length * t / tets;
+    double const thickness = std::pow(10, -flatness * unit(engine));
+    Point const corners[4] = {{0, 0, 0}, {1, 0, 0}, {0.3, 0.9, 0}, {0.4, 0.3, 0.8}};
+    Tet tet;
+    for (int a = 0; a < 4; ++a) {
+      Point X = corners[a], x = corners[a], p;
+      if (thin_rest) X[2] *= thickness;
+      x[2] *= thickness;
+      for (int k = 0; k < 3; ++k) {
+        // Everything turns with t, so that no axis is special.
+        X[k] += 0.01 * unit(engine) * (thin_rest ? thickness : 1);
+        x[k] += 0.01 * unit(engine) * thickness;
+        p[k] = 2 * unit(engine) - 1;
+      }
+      double const s = std::sin(0.1 * t), o = std::cos(0.1 * t);
+      x = {at + o * x[0] - s * x[2], x[1], s * x[0] + o * x[2]};
+      tet[a] = static_cast<int>(c.rest.points.size());
+      c.rest.points.push_back(X);
+      c.x.push_back(x);
+      c.p.push_back(p);
+    }
+    if (mirrored && t % 2 == 1) std::swap(tet[2], tet[3]);
+    c.rest.tets.push_back(tet);
+  }
+  return c;
+}
+
+/// The first inversion along p of any tet, one by one.
+template <class Positions, class Vectors>
+double first_inversion(TetMesh const& rest, Positions const& x, Vectors const& p) {
+  double first = infinity;
+  for (Tet const& tet : rest.tets) {
+    Mat3<double> X, D, d;
+    for (int a = 0; a < 3; ++a)
+      for (int c = 0; c < 3; ++c) {
+        X(c, a) = rest.points[tet[a + 1]][c] - rest.points[tet[0]][c];
+        D(c, a) = double(x(tet[a + 1], c)) - double(x(tet[0], c));
+        d(c, a) = double(p(tet[a + 1], c)) - double(p(tet[0], c));
+      }
+    double const sign = determinant(X) < 0 ? -1 : 1;
+    double const root =
+        smallest_positive_root(sign * determinant(D), sign * contract(cofactor(D), d),
+                               sign * contract(D, cofactor(d)), sign * determinant(d));
+    first = std::min(first, root);
+  }
+  return first;
+}
+
+}  // namespace
+
+TEMPLATE_TEST_CASE("no step bound lies beyond the first inversion", "[fem]", Fp64, Mixed, Fp32) {
+  using Term = ElasticTets<Elastic<NeoHookean>, TestType, Host>;
+  for (bool thin_rest : {false, true})
+    for (double flatness : {0., 3., 6.})
+      for (double length : {1., 1e3}) {
+        // A few tets, so that each decides now and then.
+        for (unsigned seed = 0; seed < 20; ++seed) {
+          Crowd const c = crowd(12, length, flatness, thin_rest, seed % 2 == 1, seed);
+          Term const term(c.rest, lame_parameters(1e5, 0.3));
+          auto const x = test::to_field(c.x, typename Term::Positions());
+          auto const p = test::to_field(c.p, typename Term::Vectors());
+          double const first = first_inversion(c.rest, x, p);
+          CAPTURE(thin_rest, flatness, length, seed, first);
+          for (double at_most : {0.1 * first, 0.9 * first, 0.999 * first, 2 * first, infinity}) {
+            double const bound = term.max_step(x, p, at_most);
+            double const exact = std::min(at_most, first);
+            CHECK(std::abs(bound - exact) <= 1e-9 * exact);
+            CHECK(term.max_prescribed_step(x, p, at_most) == bound);
+          }
+        }
+      }
+}
+
+TEST_CASE("a direction that is not a number allows no step", "[fem]") {
+  using Term = ElasticTets<Elastic<NeoHookean>, Mixed, Host>;
+  Crowd const c = crowd(40, 10, 1, false, false, 1);
+  Term const term(c.rest, lame_parameters(1e5, 0.3));
+  auto const x = test::to_field(c.x, Term::Positions());
+  auto const p = test::to_field(c.p, Term::Vectors());
+  for (int v : {0, 77, 159}) {
+    auto const kept = p(v, 1);
+    p(v, 1) = std::numeric_limits<float>::quiet_NaN();
+    CHECK(term.max_step(x, p, 2.0) == 0);
+    p(v, 1) = kept;
+  }
+}
+
+TEST_CASE("elastic terms refuse meshes that they cannot hold", "[fem]") {
+  using Term = ElasticTets<Elastic<NeoHookean>, Fp64, Host>;
+  Crowd c = crowd(3, 1, 0, false, false, 1);
+  auto const lame = lame_parameters(1e5, 0.3);
+  CHECK_THROWS_AS(Term(c.rest, lame, {.patch_size = 0}), Error);
+  CHECK_THROWS_AS(Term(c.rest, lame, {.patch_size = 4097}), Error);
+  CHECK_THROWS_AS(Term(c.rest, {lame}, {0, 1, 0}), Error);
+  CHECK_THROWS_AS(Term(c.rest, {lame}, {0, 0}), Error);
+  Term const term(c.rest, lame, {.patch_size = 4096});
+  FixedMask<Host> const fixed("fixed", 11);
+  Term::Vectors const g("g", 11);
+  CHECK_THROWS_AS(term.add_gradient(test::to_field(c.x, Term::Positions()), 1, fixed, g), Error);
+  c.rest.tets[1][2] = 12;
+  CHECK_THROWS_AS(Term(c.rest, lame), Error);
+}
