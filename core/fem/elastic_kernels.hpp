@@ -29,7 +29,7 @@ struct GradientSweep : PatchSweep<S, typename Precision::real> {
   VectorField<Real, S> p;
   Real alpha;
   Real scale;  ///< h^2
-  Kokkos::View<Real*, typename S::memory> partial;
+  SweepOutput<S, Real> output;
   Kokkos::View<typename Precision::sum*, typename S::memory> change;
 
   KOKKOS_FUNCTION int numbers() const { return 3 + static_cast<int>(curvature); }
@@ -89,11 +89,11 @@ struct GradientSweep : PatchSweep<S, typename Precision::real> {
     });
     team.team_barrier();
     if (curvature == Curvature::none) {
-      this->template take<3>(team, patch, slots, partial);
+      this->template take<3>(team, patch, slots, output);
     } else if (curvature == Curvature::diagonal) {
-      this->template take<6>(team, patch, slots, partial);
+      this->template take<6>(team, patch, slots, output);
     } else {
-      this->template take<9>(team, patch, slots, partial);
+      this->template take<9>(team, patch, slots, output);
     }
     if (after_step) this->add_up(team, patch, energies, change);
   }
@@ -110,7 +110,7 @@ struct ProductSweep : PatchSweep<S, typename Precision::real> {
   VectorField<typename Precision::position, S> x;
   VectorField<Real, S> p;
   Real scale;
-  Kokkos::View<Real*, typename S::memory> partial;
+  SweepOutput<S, Real> output;
 
   std::size_t scratch_bytes() const {
     return 2 * ScratchField<S, Real>::shmem_size(std::size_t(4) * this->patches.max_locals) +
@@ -140,7 +140,7 @@ struct ProductSweep : PatchSweep<S, typename Precision::real> {
       }
     });
     team.team_barrier();
-    this->template take<3>(team, patch, slots, partial);
+    this->template take<3>(team, patch, slots, output);
   }
 };
 
@@ -199,25 +199,19 @@ struct MeasureSweep : PatchSweep<S, typename Precision::real> {
   }
 };
 
-/// Adds what the patches left for vertex i to the gradient and the curvature.
-template <class S, class Real, int curvature_numbers, class CurvatureField>
-struct GatherVertices {
+/// Adds up what the patches left for a vertex that they share.
+template <class S, class Real, int numbers>
+struct GatherShared {
   PatchViews<S, Real> patches;
-  Kokkos::View<Real*, typename S::memory> partial;
-  Kokkos::View<std::uint8_t*, typename S::memory> fixed;
-  VectorField<Real, S> gradient;
-  CurvatureField curvature;
+  SweepOutput<S, Real> output;
 
   KOKKOS_FUNCTION void operator()(int i) const {
-    constexpr int numbers = 3 + curvature_numbers;
-    if (fixed(i)) return;
     Real sum[numbers] = {};
-    for (int k = patches.occurrence_begin(i); k < patches.occurrence_begin(i + 1); ++k) {
-      Real const* from = partial.data() + std::size_t(numbers) * patches.occurrence(k);
+    for (int row = patches.shared_begin(i); row < patches.shared_begin(i + 1); ++row) {
+      Real const* from = output.partial.data() + std::size_t(numbers) * row;
       for (int c = 0; c < numbers; ++c) sum[c] += from[c];
     }
-    for (int c = 0; c < 3; ++c) gradient(i, c) += sum[c];
-    for (int c = 0; c < curvature_numbers; ++c) curvature(i, c) += sum[3 + c];
+    output.template add<numbers>(patches.shared(i), sum);
   }
 };
 

@@ -15,7 +15,7 @@ namespace taut {
 
 /// How the sweeps are cut up. The result of a sweep depends on patch_size alone.
 struct SweepParams {
-  int patch_size = 256;  ///< tets per patch
+  int patch_size = 512;  ///< tets per patch, at most 4096
   int team_size = 0;     ///< threads per patch; 0: one on the host, 128 on a device
 };
 
@@ -100,9 +100,10 @@ public:
   void add_product(Positions const& x, Vectors const& p, double scale,
                    FixedMask<Space> const& fixed, Vectors const& hp) const {
     using Kernel = kernels::ProductSweep<Space, Precision, Material>;
-    Kernel const kernel{{patches_}, materials_, x, p, static_cast<Real>(scale), partial<3>()};
+    Kernel const kernel{{patches_},          materials_, x, p, static_cast<Real>(scale),
+                        output<3>(fixed, hp)};
     run("elastic_product", kernel);
-    gather<0>(kernel.partial, fixed, hp, hp);
+    gather<3>(kernel.output);
   }
 
   void add_to(Matrix const& matrix, Positions const& x, double scale,
@@ -163,15 +164,18 @@ private:
     Kokkos::parallel_for(name, policy(kernel.scratch_bytes()), kernel);
   }
 
-  /// One row of `numbers` per local vertex; grows when first asked for, then stays.
+  /// Rows of `numbers` for the vertices that patches share; grow when first asked for, then stay.
   template <int numbers>
-  Scratch partial() const {
-    std::size_t const needed = std::size_t(numbers) * patches_.locals;
+  kernels::SweepOutput<Space, Real> output(FixedMask<Space> const& fixed, Vectors const& g) const {
+    if (fixed.extent_int(0) != patches_.vertices)
+      throw Error("ElasticTets: the mesh has {} vertices, the potential {} unknowns",
+                  patches_.vertices, fixed.extent(0));
+    std::size_t const needed = std::size_t(numbers) * patches_.shared_rows;
     if (partial_.extent(0) < needed) {
       partial_ = Scratch(
           Kokkos::view_alloc(Kokkos::WithoutInitializing, std::string("elastic_partial")), needed);
     }
-    return partial_;
+    return {partial_, fixed, g, {}, {}};
   }
 
   /// The cheap sweep clears nearly all patches; the exact one looks at those that it cannot.
@@ -203,33 +207,30 @@ private:
   template <kernels::Curvature curvature, class CurvatureField>
   double sweep(Positions const& x, Vectors const& p, bool after_step, double alpha, double scale,
                FixedMask<Space> const& fixed, Vectors const& g, CurvatureField const& c) const {
-    using Kernel = kernels::GradientSweep<Space, Precision, Material>;
-    Kernel const kernel{{patches_},
-                        materials_,
-                        curvature,
-                        after_step,
-                        x,
-                        p,
-                        static_cast<Real>(alpha),
-                        static_cast<Real>(scale),
-                        partial<3 + static_cast<int>(curvature)>(),
-                        reducer_.partials()};
+    constexpr int numbers = 3 + static_cast<int>(curvature);
+    auto to = output<numbers>(fixed, g);
+    if constexpr (curvature == kernels::Curvature::diagonal) to.diagonal = c;
+    if constexpr (curvature == kernels::Curvature::blocks) to.blocks = c;
+    kernels::GradientSweep<Space, Precision, Material> const kernel{{patches_},
+                                                                    materials_,
+                                                                    curvature,
+                                                                    after_step,
+                                                                    x,
+                                                                    p,
+                                                                    static_cast<Real>(alpha),
+                                                                    static_cast<Real>(scale),
+                                                                    to,
+                                                                    reducer_.partials()};
     run("elastic_gradient", kernel);
-    gather<static_cast<int>(curvature)>(kernel.partial, fixed, g, c);
+    gather<numbers>(to);
     if (!after_step) return 0;
     return reducer_.template finish<1>("elastic_change", patches_.count)[0];
   }
 
-  template <int curvature_numbers, class CurvatureField>
-  void gather(Scratch const& from, FixedMask<Space> const& fixed, Vectors const& g,
-              CurvatureField const& c) const {
-    using Kernel = kernels::GatherVertices<Space, Real, curvature_numbers, CurvatureField>;
-    std::size_t const vertices = patches_.occurrence_begin.extent(0) - 1;
-    if (fixed.extent(0) != vertices)
-      throw Error("ElasticTets: the mesh has {} vertices, the potential {} unknowns", vertices,
-                  fixed.extent(0));
-    for_each<Space>("elastic_gather", static_cast<int>(vertices),
-                    Kernel{patches_, from, fixed, g, c});
+  template <int numbers>
+  void gather(kernels::SweepOutput<Space, Real> const& to) const {
+    for_each<Space>("elastic_gather", patches_.shared.extent_int(0),
+                    kernels::GatherShared<Space, Real, numbers>{patches_, to});
   }
 
   SweepParams params_;

@@ -14,6 +14,28 @@ template <class S, class Real>
 using ScratchField = Kokkos::View<Real*, typename S::execution::scratch_memory_space,
                                   Kokkos::MemoryTraits<Kokkos::Unmanaged>>;
 
+/// Where a sweep leaves what vertices receive: with the vertices that belong to one patch alone,
+/// and in a row of `partial` for each patch that shares a vertex.
+template <class S, class Real>
+struct SweepOutput {
+  Kokkos::View<Real*, typename S::memory> partial;
+  Kokkos::View<std::uint8_t*, typename S::memory> fixed;
+  VectorField<Real, S> gradient;
+  VectorField<Real, S> diagonal;  ///< if there are 6 numbers
+  BlockField<Real, S> blocks;     ///< if there are 9
+
+  template <int numbers>
+  KOKKOS_FORCEINLINE_FUNCTION void add(int v, Real const (&sum)[numbers]) const {
+    if (fixed(v)) return;
+    for (int c = 0; c < 3; ++c) gradient(v, c) += sum[c];
+    if constexpr (numbers == 6) {
+      for (int c = 0; c < 3; ++c) diagonal(v, c) += sum[3 + c];
+    } else if constexpr (numbers == 9) {
+      for (int c = 0; c < 6; ++c) blocks(v, c) += sum[3 + c];
+    }
+  }
+};
+
 /// A patch in the hands of a team: its vertex data in fast memory and its elements one pack at a
 /// time.
 template <class S, class Real>
@@ -97,23 +119,18 @@ struct PatchSweep {
                                         Value const (&received)[numbers],
                                         ScratchField<S, Real> const& slots) const {
     if (S::on_host && to_vertex) {
-      constexpr int rows = padded(numbers) / 4;
-      std::uint16_t const* corner = corners(patch, g) + a * lanes;
-      add_rows<Kokkos::min(numbers, 4), rows>(received, slots.data(), corner);
-      if constexpr (rows > 1)
-        add_rows<Kokkos::min(numbers - 4, 4), rows>(received + 4, slots.data() + 4, corner);
-      if constexpr (rows > 2) add_rows<numbers - 8, rows>(received + 8, slots.data() + 8, corner);
+      add_rows<numbers, padded(numbers) / 4>(received, slots.data(), corners(patch, g) + a * lanes);
     } else {
       // [number][pack][corner][lane]
       Real* const slot = slots.data() + (g / per_pack * 4 + a) * lanes + g % per_pack * width;
       for (int c = 0; c < numbers; ++c) store(received[c], slot + c * stride());
     }
   }
-  /// Writes the sum of each local vertex to its row of `partial`.
-  template <int numbers, class Team, class Partial>
+  /// Hands over the sum of each local vertex.
+  template <int numbers, class Team>
   KOKKOS_FORCEINLINE_FUNCTION void take(Team const& team, int patch,
                                         ScratchField<S, Real> const& slots,
-                                        Partial const& partial) const {
+                                        SweepOutput<S, Real> const& output) const {
     int const first = patches.local_begin(patch), step = stride();
     bool const added = alone(team);
     Kokkos::parallel_for(Kokkos::TeamThreadRange(team, locals(patch)), [&](int l) {
@@ -127,7 +144,12 @@ struct PatchSweep {
           for (int c = 0; c < numbers; ++c) sum[c] += from[c * step];
         }
       }
-      for (int c = 0; c < numbers; ++c) partial(numbers * (first + l) + c) = sum[c];
+      int const row = patches.row(first + l);
+      if (row >= 0) {
+        for (int c = 0; c < numbers; ++c) output.partial(numbers * row + c) = sum[c];
+      } else {
+        output.template add<numbers>(patches.vertex(first + l), sum);
+      }
     });
   }
 

@@ -111,6 +111,16 @@ Patches make_patches(std::span<Tet const> tets, std::span<int const> material, i
     first = last;
   }
   compress(p.vertex, vertices, p.occurrence_begin, p.occurrence);
+  p.row.assign(p.vertex.size(), -1);
+  p.shared_begin = {0};
+  int rows = 0;
+  for (int v = 0; v < vertices; ++v) {
+    int const begin = p.occurrence_begin[v], end = p.occurrence_begin[v + 1];
+    if (end - begin < 2) continue;
+    for (int k = begin; k < end; ++k) p.row[p.occurrence[k]] = rows++;
+    p.shared.push_back(v);
+    p.shared_begin.push_back(rows);
+  }
   p.colours = colour(p);
   return p;
 }

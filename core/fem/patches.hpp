@@ -3,9 +3,10 @@
 //
 // A sweep over a patch (1) copies the data of its vertices to local memory, (2) computes its
 // elements, a pack of them at a time, and leaves what each corner receives in a slot, (3) adds up
-// the slots of each local vertex in a fixed order and writes one partial sum. A second loop over
-// the vertices adds up their partial sums over patches, again in a fixed order. No atomics; the
-// result depends neither on the number of threads nor on the size of a team.
+// the slots of each local vertex in a fixed order. The sum of a vertex that no other patch has is
+// added to the result; those of shared vertices go to rows of their own, and a second loop over
+// the shared vertices adds up their rows, again in a fixed order. No atomics; the result depends
+// neither on the number of threads nor on the size of a team.
 #pragma once
 
 #include <taut/core/exec/space.hpp>
@@ -33,6 +34,9 @@ struct Patches {
   std::vector<std::uint16_t> incidence;   ///< slot (pack within patch * 4 + corner) * lanes + lane
   std::vector<int> occurrence_begin;      ///< per vertex of the mesh, +1
   std::vector<int> occurrence;            ///< its local vertices, ascending
+  std::vector<int> shared;                ///< vertices that several patches have
+  std::vector<int> shared_begin;          ///< per shared vertex, +1: its rows
+  std::vector<int> row;                   ///< per local vertex: its row, or -1 if not shared
   std::vector<std::vector<int>> colours;  ///< patches that share no vertex, for assembly
   int max_locals = 0, max_packs = 0;
 
@@ -55,9 +59,8 @@ struct PatchViews {
   /// Elements per pack: one register on the host, one warp on a device.
   static constexpr int lanes = S::on_host ? host_lanes<Real> : 32;
 
-  int count = 0, locals = 0, max_locals = 0, max_packs = 0;
-  Data<int> pack_begin, local_begin, material, vertex, incidence_begin, occurrence_begin,
-      occurrence;
+  int count = 0, vertices = 0, shared_rows = 0, max_locals = 0, max_packs = 0;
+  Data<int> pack_begin, local_begin, material, vertex, incidence_begin, shared, shared_begin, row;
   Data<std::uint16_t> corner, incidence;
   /// [pack][10][lane]: the inverse rest shape B = Dm^-1 by columns, then the rest volume W.
   Data<Real> rest;
@@ -80,7 +83,8 @@ template <class S, class Real>
 PatchViews<S, Real> copy_patches(Patches const& patches, std::vector<double> const& rest) {
   PatchViews<S, Real> v;
   v.count = patches.count();
-  v.locals = static_cast<int>(patches.vertex.size());
+  v.vertices = static_cast<int>(patches.occurrence_begin.size()) - 1;
+  v.shared_rows = patches.shared_begin.back();
   v.max_locals = patches.max_locals;
   v.max_packs = patches.max_packs;
   v.pack_begin = to_space<S>("patch_packs", patches.pack_begin);
@@ -89,8 +93,9 @@ PatchViews<S, Real> copy_patches(Patches const& patches, std::vector<double> con
   v.vertex = to_space<S>("patch_vertex", patches.vertex);
   v.incidence_begin = to_space<S>("patch_incidence_begin", patches.incidence_begin);
   v.incidence = to_space<S>("patch_incidence", patches.incidence);
-  v.occurrence_begin = to_space<S>("patch_occurrence_begin", patches.occurrence_begin);
-  v.occurrence = to_space<S>("patch_occurrence", patches.occurrence);
+  v.shared = to_space<S>("patch_shared", patches.shared);
+  v.shared_begin = to_space<S>("patch_shared_begin", patches.shared_begin);
+  v.row = to_space<S>("patch_row", patches.row);
   v.corner = to_space<S>("patch_corner", patches.corner);
   std::vector<Real> packed(rest.size());
   constexpr std::size_t lanes = PatchViews<S, Real>::lanes;

@@ -113,14 +113,15 @@ KOKKOS_FORCEINLINE_FUNCTION void load_rows(ValueType<T> const* from, Index const
   }
 }
 
-/// Adds the lanes of the `numbers` (up to four) in `row` to the rows to[scale begin[lane]...], in
-/// the order of the lanes.
+namespace kernels {
+
+/// Adds rows of up to four numbers.
 template <int numbers, int scale, class T, class Index>
-KOKKOS_FORCEINLINE_FUNCTION void add_rows(T const* row, ValueType<T>* to, Index const* begin) {
+KOKKOS_FORCEINLINE_FUNCTION void add_quads(T const* row, ValueType<T>* to, Index const* begin) {
   constexpr int lanes = ScalarTraits<T>::lanes;
-  if constexpr (kernels::has_quads<T>) {
+  if constexpr (has_quads<T>) {
 #if defined(__GNUC__) && !defined(__CUDACC__)
-    using Registers = kernels::QuadsOf<T>;
+    using Registers = QuadsOf<T>;
     typename Registers::Vector v[4] = {};
     for (int c = 0; c < numbers; ++c) {
       v[c] = std::bit_cast<typename Registers::Vector>(row[c]);
@@ -139,6 +140,48 @@ KOKKOS_FORCEINLINE_FUNCTION void add_rows(T const* row, ValueType<T>* to, Index 
     for (int i = 0; i < lanes; ++i)
       for (int c = 0; c < numbers; ++c) to[scale * begin[i] + c] += lane(row[c], i);
   }
+}
+
+#if defined(__GNUC__) && !defined(__CUDACC__)
+/// Adds rows of five to eight numbers of eight lanes, a whole register at a time: half the loads
+/// and stores of two quads.
+template <int numbers, int scale, class T, class Index>
+void add_octets(T const* row, ValueType<T>* to, Index const* begin) {
+  using Registers = QuadsOf<T>;
+  using Vector = typename Registers::Vector;
+  Vector a[4], b[4] = {};
+  for (int c = 0; c < 4; ++c) a[c] = std::bit_cast<Vector>(row[c]);
+  for (int c = 4; c < numbers; ++c) b[c - 4] = std::bit_cast<Vector>(row[c]);
+  Registers::transpose(a);
+  Registers::template transpose<(numbers <= 6)>(b);
+  for (int lane = 0; lane < 8; ++lane) {
+    int const j = lane % 4;
+    Vector const add = lane < 4 ? __builtin_shufflevector(a[j], b[j], 0, 1, 2, 3, 8, 9, 10, 11)
+                                : __builtin_shufflevector(a[j], b[j], 4, 5, 6, 7, 12, 13, 14, 15);
+    Vector sum;
+    ValueType<T>* const at = to + scale * std::size_t(begin[lane]);
+    std::memcpy(&sum, at, sizeof sum);
+    sum += add;
+    std::memcpy(at, &sum, sizeof sum);
+  }
+}
+#endif
+
+}  // namespace kernels
+
+/// Adds the lanes of `numbers` packs to the rows to[scale begin[lane]...], each `numbers` long and
+/// padded to a multiple of four, in the order of the lanes.
+template <int numbers, int scale, class T, class Index>
+KOKKOS_FORCEINLINE_FUNCTION void add_rows(T const* row, ValueType<T>* to, Index const* begin) {
+#if defined(__GNUC__) && !defined(__CUDACC__)
+  if constexpr (numbers > 4 && kernels::has_quads<T> && ScalarTraits<T>::lanes == 8) {
+    kernels::add_octets<Kokkos::min(numbers, 8), scale>(row, to, begin);
+    if constexpr (numbers > 8) add_rows<numbers - 8, scale>(row + 8, to + 8, begin);
+    return;
+  }
+#endif
+  kernels::add_quads<Kokkos::min(numbers, 4), scale>(row, to, begin);
+  if constexpr (numbers > 4) add_rows<numbers - 4, scale>(row + 4, to + 4, begin);
 }
 
 }  // namespace taut
