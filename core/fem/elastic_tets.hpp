@@ -140,7 +140,7 @@ private:
   template <class Kernel>
   void run(char const* name, Kernel const& kernel) const {
     if (patches_.count == 0) return;
-    Kokkos::parallel_for(name, policy(kernel.scratch_bytes()), kernel);
+    Kokkos::parallel_for(label(name), policy(kernel.scratch_bytes()), kernel);
   }
 
   /// One row of `numbers` per local vertex; grows when first asked for, then stays.
@@ -161,12 +161,12 @@ private:
     using Certificate = kernels::CertificateSweep<Space, Precision>;
     Certificate const certificate{{patches_}, x, p, certified_};
     double smallest = at_most;
-    Kokkos::parallel_reduce("elastic_certificate", policy(certificate.scratch_bytes()), certificate,
-                            Kokkos::Min<double>(smallest));
+    Kokkos::parallel_reduce(label("elastic_certificate"), policy(certificate.scratch_bytes()),
+                            certificate, Kokkos::Min<double>(smallest));
     if (smallest >= at_most) return at_most;
     smallest = at_most;
     Kokkos::parallel_reduce(
-        "elastic_max_step", policy(0),
+        label("elastic_max_step"), policy(0),
         kernels::InversionSweep<Space, Precision>{patches_, x, p, certified_, at_most, strict},
         Kokkos::Min<double>(smallest));
     // Kokkos' identity of the minimum is the largest finite number.
