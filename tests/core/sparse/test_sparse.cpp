@@ -1,5 +1,5 @@
 // Patterns, assembly and products of block matrices against plain dense loops.
-#include "sparse_samples.hpp"
+#include "samples.hpp"
 
 #include <taut/core/report/error.hpp>
 #include <taut/core/sparse/operations.hpp>
