@@ -31,7 +31,8 @@ inline std::string const& label(std::string_view name) {
 /// Calls `functor(i)` for i in [0, n).
 template <class S, class Functor>
 void for_each(char const* name, int n, Functor const& functor) {
-  Kokkos::parallel_for(label(name), Kokkos::RangePolicy<typename S::execution>(0, n), functor);
+  Kokkos::parallel_for(label(name), Kokkos::RangePolicy<typename S::execution>(S::instance(), 0, n),
+                       functor);
 }
 
 /// Calls `functor(i, largest)` for i in [0, n), where `functor` raises `largest`; returns it, or
@@ -40,8 +41,9 @@ template <class S, class T, class Functor>
 T maximum(char const* name, int n, T floor, Functor const& functor) {
   T result = floor;
   if (n > 0) {
-    Kokkos::parallel_reduce(label(name), Kokkos::RangePolicy<typename S::execution>(0, n), functor,
-                            Kokkos::Max<T>(result));
+    Kokkos::parallel_reduce(label(name),
+                            Kokkos::RangePolicy<typename S::execution>(S::instance(), 0, n),
+                            functor, Kokkos::Max<T>(result));
   }
   return Kokkos::max(result, floor);
 }
@@ -51,8 +53,9 @@ template <class S, class T, class Functor>
 T minimum(char const* name, int n, T ceiling, Functor const& functor) {
   T result = ceiling;
   if (n > 0) {
-    Kokkos::parallel_reduce(label(name), Kokkos::RangePolicy<typename S::execution>(0, n), functor,
-                            Kokkos::Min<T>(result));
+    Kokkos::parallel_reduce(label(name),
+                            Kokkos::RangePolicy<typename S::execution>(S::instance(), 0, n),
+                            functor, Kokkos::Min<T>(result));
   }
   return Kokkos::min(result, ceiling);
 }
@@ -143,9 +146,8 @@ public:
       count = next;
     }
     auto const range = Kokkos::make_pair(std::size_t(0), std::size_t(K) * count);
-    Kokkos::deep_copy(typename S::execution(), Kokkos::subview(host_, range),
-                      Kokkos::subview(from, range));
-    Kokkos::fence("taut: reduction");
+    Kokkos::deep_copy(S::instance(), Kokkos::subview(host_, range), Kokkos::subview(from, range));
+    S::instance().fence("taut: reduction");
     Sums<T, K> total;
     for (int i = 0; i < count; ++i)
       for (int k = 0; k < K; ++k) total[k] += host_(K * i + k);
@@ -198,7 +200,8 @@ template <class S, class T>
 template <int K, class Functor>
 Sums<T, K> FreeReducer<S, T>::sum(char const* name, int n, Functor const& functor) const {
   Sums<T, K> total;
-  Kokkos::parallel_reduce(label(name), Kokkos::RangePolicy<typename S::execution>(0, n),
+  Kokkos::parallel_reduce(label(name),
+                          Kokkos::RangePolicy<typename S::execution>(S::instance(), 0, n),
                           kernels::FreeSum<Functor, T, K>{functor}, total);
   return total;
 }

@@ -40,7 +40,8 @@ requires std::integral<T> T exclusive_scan(char const* name, int n, Functor cons
   T total = 0;
   if (n == 0) return total;
   using Scan = kernels::ExclusiveScan<T, Kokkos::View<T*, typename S::memory>, Functor>;
-  Kokkos::parallel_scan(label(name), Kokkos::RangePolicy<typename S::execution>(0, n),
+  Kokkos::parallel_scan(label(name),
+                        Kokkos::RangePolicy<typename S::execution>(S::instance(), 0, n),
                         Scan{functor, to}, total);
   return total;
 }

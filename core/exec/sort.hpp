@@ -151,8 +151,7 @@ private:
   template <class View>
   static void copy(int n, View const& from, View const& to) {
     auto const range = Kokkos::make_pair(0, n);
-    Kokkos::deep_copy(typename S::execution(), Kokkos::subview(to, range),
-                      Kokkos::subview(from, range));
+    Kokkos::deep_copy(S::instance(), Kokkos::subview(to, range), Kokkos::subview(from, range));
   }
 
   int max_keys_ = 0;

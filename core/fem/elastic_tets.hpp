@@ -132,7 +132,7 @@ private:
 
   typename Space::team_policy policy(std::size_t scratch_bytes) const {
     int const team = params_.team_size > 0 ? params_.team_size : (Space::on_host ? 1 : 128);
-    typename Space::team_policy p(patches_.count, team);
+    typename Space::team_policy p(Space::instance(), patches_.count, team);
     if (scratch_bytes > 0) p.set_scratch_size(0, Kokkos::PerTeam(static_cast<int>(scratch_bytes)));
     return p;
   }

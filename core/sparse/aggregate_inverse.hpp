@@ -215,8 +215,8 @@ public:
 
 private:
   typename S::team_policy policy() const {
-    if (team_ > 0) return typename S::team_policy(count_, team_);
-    return typename S::team_policy(count_, Kokkos::AUTO);
+    if (team_ > 0) return typename S::team_policy(S::instance(), count_, team_);
+    return typename S::team_policy(S::instance(), count_, Kokkos::AUTO);
   }
 
   int run_ = 0, count_ = 0, team_ = 0;
