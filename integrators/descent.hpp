@@ -119,7 +119,7 @@ private:
     Heading const heading = aim(renewed);
     report_.gradient_norm = std::sqrt(heading.gradient / scale_.mass);
     if (!std::isfinite(heading.slope)) {
-      if (report_.iterations > 0) Kokkos::deep_copy(typename S::execution(), x_, fields_.from);
+      if (report_.iterations > 0) Kokkos::deep_copy(S::instance(), x_, fields_.from);
       report_.stop = Stop::non_finite;
     } else if (heading.descent == 0) {
       if (advance_prescribed())

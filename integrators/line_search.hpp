@@ -78,7 +78,7 @@ public:
   }
   /// Back to where the line begins, exactly.
   void retreat() {
-    if (moved_) Kokkos::deep_copy(typename S::execution(), x_, fields_.from);
+    if (moved_) Kokkos::deep_copy(S::instance(), x_, fields_.from);
   }
   /// Evaluates the gradient at x; the energy difference to the beginning.
   double evaluate() {

@@ -116,7 +116,7 @@ public:
   template <class Product, class M>
   LinearReport solve(Product const& product, M const& preconditioner, Vectors const& b,
                      double tolerance, int max_iterations, Vectors const& p) {
-    typename S::execution const execution;
+    typename S::execution const& execution = S::instance();
     int const n = static_cast<int>(b.extent(0));
     Kokkos::deep_copy(execution, p, Real(0));
     Kokkos::deep_copy(execution, r_, b);

@@ -20,6 +20,16 @@ template <class T>
 KOKKOS_FORCEINLINE_FUNCTION Vec3<T> clamped_diagonal(Sym3<T> const& h) {
   return {max(h.s[0], T(0)), max(h.s[1], T(0)), max(h.s[2], T(0))};
 }
+
+/// The state with the negative weights of squares in a vertex block left out. What remains of the
+/// block, but for the term with dPsi/dI1, is positive semi-definite for every model.
+template <class Model, class T>
+KOKKOS_FORCEINLINE_FUNCTION void keep_squares(IsotropicState<Model, T>& s) {
+  s.d.d2 = max(s.d.d2, T(0));
+  if constexpr (Model::use.d11) s.d.d11 = max(s.d.d11, T(0));
+  if constexpr (Model::use.d22) s.d.d22 = max(s.d.d22, T(0));
+  if constexpr (Model::use.d3) s.d.d33 = max(s.d.d33, T(0));
+}
 }  // namespace kernels
 
 /// The paper's: each of the twelve diagonal entries and the scalar dF:H:dF are cut off at zero.
@@ -34,13 +44,12 @@ struct ClampElement {
   template <class Model, class T>
   KOKKOS_FORCEINLINE_FUNCTION static Sym3<T> block(IsotropicState<Model, T> const& s,
                                                    Vec3<T> const& b) {
-    // Without I1 and with d33 >= 0 a vertex block is a sum of squares; only then skip the
-    // projection.
+    // Without I1 a vertex block is a sum of squares, which needs no eigenvalues.
     if constexpr (Model::use.d1) {
       return project_psd(vertex_block<Model, false>(s, b));
     } else {
       IsotropicState<Model, T> positive = s;
-      positive.d.d33 = max(s.d.d33, T(0));
+      kernels::keep_squares(positive);
       return vertex_block<Model, false>(positive, b);
     }
   }
@@ -54,7 +63,9 @@ struct ClampElement {
 /// The public reference's "filter" variants, without its index error: the curvature of the
 /// rotation, lambda = 2 / (si + sj), is limited to 1 for all three pairs, and a negative volumetric
 /// term dPsi/dJ F:cof(dF) is dropped. What is left may still be negative for models outside ARAP
-/// and fixed corotated, so the element is clamped as well.
+/// and fixed corotated, so their squares are limited to positive weights, dPsi/dI1 to what
+/// 2 dPsi/dI2 outweighs (|axial(R^T dF)| <= |dF| for a vertex, times lambda / 2 <= 1/2), and the
+/// element is clamped as well.
 struct LimitLambda {
   static constexpr char const* name = "limit_lambda";
 
@@ -92,7 +103,8 @@ private:
       }
       l.G_inv = e.compose();
     }
-    l.d.d33 = max(s.d.d33, T(0));
+    kernels::keep_squares(l);
+    if constexpr (Model::use.d1) l.d.d1 = max(l.d.d1, T(-4) * l.d.d2);
     return l;
   }
 };

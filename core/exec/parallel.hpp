@@ -3,20 +3,36 @@
 // Sums are deterministic: the terms are added in runs of fixed length, each by one thread in index
 // order, and the run sums are added the same way until few are left. The shape of the sum depends
 // on the number of terms alone, never on the number of threads, so results are bitwise repeatable.
-// `FreeSum` is the opt-out: it leaves the order to Kokkos.
+// `FreeReducer` is the opt-out: it leaves the order to Kokkos.
 #pragma once
 
 #include <taut/core/exec/space.hpp>
+#include <taut/core/report/error.hpp>
 
-#include <array>
-#include <type_traits>
+#include <functional>
+#include <mutex>
+#include <set>
+#include <string>
+#include <string_view>
+#include <utility>
 
 namespace taut {
+
+/// The name of a loop as Kokkos takes it, kept from its first use on: a std::string made anew for
+/// each loop would be an allocation per loop. Safe to call from several threads.
+inline std::string const& label(std::string_view name) {
+  static std::mutex mutex;
+  static std::set<std::string, std::less<>> labels;
+  std::lock_guard<std::mutex> const lock(mutex);
+  auto const found = labels.find(name);
+  return found != labels.end() ? *found : *labels.emplace(name).first;
+}
 
 /// Calls `functor(i)` for i in [0, n).
 template <class S, class Functor>
 void for_each(char const* name, int n, Functor const& functor) {
-  Kokkos::parallel_for(name, Kokkos::RangePolicy<typename S::execution>(0, n), functor);
+  Kokkos::parallel_for(label(name), Kokkos::RangePolicy<typename S::execution>(S::instance(), 0, n),
+                       functor);
 }
 
 /// Calls `functor(i, largest)` for i in [0, n), where `functor` raises `largest`; returns it, or
@@ -25,8 +41,9 @@ template <class S, class T, class Functor>
 T maximum(char const* name, int n, T floor, Functor const& functor) {
   T result = floor;
   if (n > 0) {
-    Kokkos::parallel_reduce(name, Kokkos::RangePolicy<typename S::execution>(0, n), functor,
-                            Kokkos::Max<T>(result));
+    Kokkos::parallel_reduce(label(name),
+                            Kokkos::RangePolicy<typename S::execution>(S::instance(), 0, n),
+                            functor, Kokkos::Max<T>(result));
   }
   return Kokkos::max(result, floor);
 }
@@ -36,8 +53,9 @@ template <class S, class T, class Functor>
 T minimum(char const* name, int n, T ceiling, Functor const& functor) {
   T result = ceiling;
   if (n > 0) {
-    Kokkos::parallel_reduce(name, Kokkos::RangePolicy<typename S::execution>(0, n), functor,
-                            Kokkos::Min<T>(result));
+    Kokkos::parallel_reduce(label(name),
+                            Kokkos::RangePolicy<typename S::execution>(S::instance(), 0, n),
+                            functor, Kokkos::Min<T>(result));
   }
   return Kokkos::min(result, ceiling);
 }
@@ -63,8 +81,8 @@ struct SumRun {
   int n, length;
   KOKKOS_FUNCTION void operator()(int r) const {
     Sums<T, K> sums;
-    int const last = Kokkos::min(n, (r + 1) * length);
-    for (int i = r * length; i < last; ++i) functor(i, sums);
+    int const first = r * length, last = first + Kokkos::min(length, n - first);
+    for (int i = first; i < last; ++i) functor(i, sums);
     for (int k = 0; k < K; ++k) partial(K * r + k) = sums[k];
   }
 };
@@ -91,7 +109,9 @@ public:
 
   Reducer() = default;
   explicit Reducer(int max_terms, int max_sums = 8)
-      : first_("reducer_first", std::size_t(runs(max_terms)) * max_sums),
+      : max_terms_(max_terms),
+        max_sums_(max_sums),
+        first_("reducer_first", std::size_t(runs(max_terms)) * max_sums),
         second_("reducer_second", std::size_t(runs(runs(max_terms))) * max_sums),
         host_("reducer_host", std::size_t(run_length) * max_sums) {}
 
@@ -100,10 +120,12 @@ public:
     return Reducer(count * run_length, max_sums);
   }
 
-  /// `functor(i, Sums<T, K>& sums)` adds the terms of iteration i.
+  /// `functor(i, Sums<T, K>& sums)` adds the terms of iteration i. Throws Error if there are more
+  /// terms or sums than the scratch memory was made for.
   template <int K, class Functor>
   Sums<T, K> sum(char const* name, int n, Functor const& functor) const {
     if (n == 0) return {};
+    check(name, n, max_terms_, K);
     int count = runs(n);
     for_each<S>(name, count, kernels::SumRun<View, Functor, T, K>{functor, first_, n, run_length});
     return finish<K>(name, count);
@@ -112,6 +134,8 @@ public:
   /// The sum of `count` partial sums that a kernel has left in `partials()`, at K * i + k.
   template <int K>
   Sums<T, K> finish(char const* name, int count) const {
+    if (count == 0) return {};
+    check(name, count, runs(max_terms_), K);
     View from = first_, to = second_;
     while (count > run_length) {
       int const next = runs(count);
@@ -122,9 +146,8 @@ public:
       count = next;
     }
     auto const range = Kokkos::make_pair(std::size_t(0), std::size_t(K) * count);
-    Kokkos::deep_copy(typename S::execution(), Kokkos::subview(host_, range),
-                      Kokkos::subview(from, range));
-    Kokkos::fence("taut: reduction");
+    Kokkos::deep_copy(S::instance(), Kokkos::subview(host_, range), Kokkos::subview(from, range));
+    S::instance().fence("taut: reduction");
     Sums<T, K> total;
     for (int i = 0; i < count; ++i)
       for (int k = 0; k < K; ++k) total[k] += host_(K * i + k);
@@ -136,8 +159,17 @@ public:
 
 private:
   using View = Kokkos::View<T*, typename S::memory>;
-  static int runs(int n) { return (n + run_length - 1) / run_length; }
+  static int runs(int n) { return n / run_length + (n % run_length > 0); }
+  void check(char const* name, int terms, int max_terms, int sums) const {
+    if (terms > max_terms || sums > max_sums_) {
+      throw Error(
+          "{}: a reducer for {} sums of {} terms cannot take {} sums of {}: construct it "
+          "for as many",
+          name, max_sums_, max_terms, sums, terms);
+    }
+  }
 
+  int max_terms_ = 0, max_sums_ = 0;
   View first_, second_;
   Kokkos::View<T*, Kokkos::HostSpace> host_;
 };
@@ -168,7 +200,8 @@ template <class S, class T>
 template <int K, class Functor>
 Sums<T, K> FreeReducer<S, T>::sum(char const* name, int n, Functor const& functor) const {
   Sums<T, K> total;
-  Kokkos::parallel_reduce(name, Kokkos::RangePolicy<typename S::execution>(0, n),
+  Kokkos::parallel_reduce(label(name),
+                          Kokkos::RangePolicy<typename S::execution>(S::instance(), 0, n),
                           kernels::FreeSum<Functor, T, K>{functor}, total);
   return total;
 }

@@ -17,6 +17,13 @@ struct Space {
   using team_policy = Kokkos::TeamPolicy<Execution>;
   using team_member = typename team_policy::member_type;
   static constexpr bool on_host = Kokkos::SpaceAccessibility<Kokkos::HostSpace, memory>::accessible;
+
+  /// The instance of the execution space that everything runs on: the default one, made once, for
+  /// each `execution()` allocates.
+  static execution const& instance() {
+    static execution const space;
+    return space;
+  }
 };
 
 using DefaultSpace = Space<Kokkos::DefaultExecutionSpace>;

@@ -153,7 +153,7 @@ private:
 
   typename Space::team_policy policy(std::size_t scratch_bytes) const {
     int const team = params_.team_size > 0 ? params_.team_size : (Space::on_host ? 1 : 128);
-    typename Space::team_policy p(patches_.count, team);
+    typename Space::team_policy p(Space::instance(), patches_.count, team);
     if (scratch_bytes > 0) p.set_scratch_size(0, Kokkos::PerTeam(static_cast<int>(scratch_bytes)));
     return p;
   }
@@ -161,7 +161,7 @@ private:
   template <class Kernel>
   void run(char const* name, Kernel const& kernel) const {
     if (patches_.count == 0) return;
-    Kokkos::parallel_for(name, policy(kernel.scratch_bytes()), kernel);
+    Kokkos::parallel_for(label(name), policy(kernel.scratch_bytes()), kernel);
   }
 
   /// Rows of `numbers` for the vertices that patches share; grow when first asked for, then stay.
@@ -185,12 +185,12 @@ private:
     using Certificate = kernels::CertificateSweep<Space, Precision>;
     Certificate const certificate{{patches_}, x, p, certified_};
     double smallest = at_most;
-    Kokkos::parallel_reduce("elastic_certificate", policy(certificate.scratch_bytes()), certificate,
-                            Kokkos::Min<double>(smallest));
+    Kokkos::parallel_reduce(label("elastic_certificate"), policy(certificate.scratch_bytes()),
+                            certificate, Kokkos::Min<double>(smallest));
     if (smallest >= at_most) return at_most;
     smallest = at_most;
     Kokkos::parallel_reduce(
-        "elastic_max_step", policy(0),
+        label("elastic_max_step"), policy(0),
         kernels::InversionSweep<Space, Precision>{patches_, x, p, certified_, at_most, strict},
         Kokkos::Min<double>(smallest));
     // Kokkos' identity of the minimum is the largest finite number.

@@ -1,22 +1,13 @@
+#include <taut/core/exec/buckets.hpp>
 #include <taut/core/fem/patches.hpp>
 #include <taut/core/report/error.hpp>
 
 #include <algorithm>
+#include <utility>
 
 namespace taut {
 
 namespace {
-
-// Compressed lists: list i of `lists` takes each j with key[j] == i, ascending in j.
-void compress(std::vector<int> const& key, int lists, std::vector<int>& begin,
-              std::vector<int>& entries) {
-  begin.assign(lists + 1, 0);
-  for (int k : key) ++begin[k + 1];
-  for (int i = 0; i < lists; ++i) begin[i + 1] += begin[i];
-  entries.resize(key.size());
-  std::vector<int> next(begin.begin(), begin.end() - 1);
-  for (std::size_t j = 0; j < key.size(); ++j) entries[next[key[j]]++] = static_cast<int>(j);
-}
 
 // Greedy colouring: patches of one colour share no vertex.
 std::vector<std::vector<int>> colour(Patches const& p) {
@@ -110,7 +101,9 @@ Patches make_patches(std::span<Tet const> tets, std::span<int const> material, i
     p.max_locals = std::max(p.max_locals, locals);
     first = last;
   }
-  compress(p.vertex, vertices, p.occurrence_begin, p.occurrence);
+  Buckets occurrences = sort_into_buckets(p.vertex, vertices);
+  p.occurrence_begin = std::move(occurrences.begin);
+  p.occurrence = std::move(occurrences.item);
   p.row.assign(p.vertex.size(), -1);
   p.shared_begin = {0};
   int rows = 0;

@@ -193,13 +193,13 @@ KOKKOS_FORCEINLINE_FUNCTION Vec3<T> axial(Mat3<T> const& A) {
   return {A(2, 1) - A(1, 2), A(0, 2) - A(2, 0), A(1, 0) - A(0, 1)};
 }
 
-/// Where sums si + sj of singular values are cut off, for a division: 32 epsilon (s0 + s1 + s2),
-/// the size of their rounding error; for F = 0 a number whose inverse is far from overflow.
+/// Where sums si + sj of singular values are cut off, for a division: 32 epsilon (1 + s0 + s1 +
+/// s2). Relative to the size of F that is the size of their rounding error; absolute, as F has no
+/// dimension, it keeps 1 / (si + sj) below 1 / (32 epsilon) where an element shrinks to a point.
 template <class T>
 KOKKOS_FORCEINLINE_FUNCTION T stretch_floor(T const& trace) {
-  using Real = ValueType<T>;
-  constexpr Real eps = Kokkos::Experimental::epsilon_v<Real>;
-  return T(32 * eps) * trace + T(Kokkos::Experimental::norm_min_v<Real> / eps);
+  constexpr ValueType<T> eps = Kokkos::Experimental::epsilon_v<ValueType<T>>;
+  return T(32 * eps) * (T(1) + trace);
 }
 
 /// si + sj of a decomposition with signed singular values s, at least the floor: never negative

@@ -6,6 +6,7 @@
 // and need no memory; an element is evaluated once per corner.
 #pragma once
 
+#include <taut/core/exec/buckets.hpp>
 #include <taut/core/exec/parallel.hpp>
 #include <taut/core/potential/term.hpp>
 #include <taut/core/report/error.hpp>
@@ -157,25 +158,18 @@ public:
   /// `elements[e]` names the N unknowns of element e; there are `unknowns` in all.
   StencilTerm(Kernel const& kernel, std::vector<std::array<int, N>> const& elements, int unknowns)
       : kernel_(kernel), reducer_(static_cast<int>(elements.size()), 1) {
-    std::vector<int> begin(unknowns + 1, 0), incidence;
     for (auto const& element : elements) {
       for (int v : element) {
         if (v < 0 || v >= unknowns) {
           throw Error("an element names unknown {}, but there are {}: renumber it", v, unknowns);
         }
-        ++begin[v + 1];
         vertices_.push_back(v);
       }
     }
-    for (int v = 0; v < unknowns; ++v) begin[v + 1] += begin[v];
-    incidence.resize(vertices_.size());
-    std::vector<int> next(begin.begin(), begin.end() - 1);
-    for (std::size_t k = 0; k < vertices_.size(); ++k) {
-      incidence[next[vertices_[k]]++] = static_cast<int>(k);
-    }
+    Buckets const incidence = sort_into_buckets(vertices_, unknowns);
     vertex_ = copy("stencil_vertex", vertices_);
-    incidence_begin_ = copy("stencil_incidence_begin", begin);
-    incidence_ = copy("stencil_incidence", incidence);
+    incidence_begin_ = copy("stencil_incidence_begin", incidence.begin);
+    incidence_ = copy("stencil_incidence", incidence.item);
   }
 
   double value(Positions const& x, double scale) const {

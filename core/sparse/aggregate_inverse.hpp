@@ -195,7 +195,7 @@ public:
     int const bytes = static_cast<int>(kernel.scratch_size());
     kernel.scratch_level = bytes <= Policy::scratch_size_max(0) ? 0 : 1;
     int floored = 0;
-    Kokkos::parallel_reduce("schwarz_factor",
+    Kokkos::parallel_reduce(label("schwarz_factor"),
                             policy().set_scratch_size(kernel.scratch_level, Kokkos::PerTeam(bytes)),
                             kernel, floored);
     return floored;
@@ -206,8 +206,8 @@ public:
   void apply(VectorField<R, S> const& r, VectorField<R, S> const& z) const {
     kernels::ApplyAggregate<S, Storage, R> const kernel{factor_, r, z, run_};
     int const bytes = static_cast<int>(kernel.scratch_size());
-    Kokkos::parallel_for("schwarz_apply", policy().set_scratch_size(0, Kokkos::PerTeam(bytes)),
-                         kernel);
+    Kokkos::parallel_for(label("schwarz_apply"),
+                         policy().set_scratch_size(0, Kokkos::PerTeam(bytes)), kernel);
   }
 
   int aggregates() const { return count_; }
@@ -215,8 +215,8 @@ public:
 
 private:
   typename S::team_policy policy() const {
-    if (team_ > 0) return typename S::team_policy(count_, team_);
-    return typename S::team_policy(count_, Kokkos::AUTO);
+    if (team_ > 0) return typename S::team_policy(S::instance(), count_, team_);
+    return typename S::team_policy(S::instance(), count_, Kokkos::AUTO);
   }
 
   int run_ = 0, count_ = 0, team_ = 0;

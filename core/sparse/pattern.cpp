@@ -1,37 +1,14 @@
+#include <taut/core/exec/buckets.hpp>
 #include <taut/core/report/error.hpp>
 #include <taut/core/sparse/pattern.hpp>
 
 #include <algorithm>
-#include <cstdint>
 #include <limits>
-#include <numeric>
 
 namespace taut {
 namespace {
 
-/// The elements of one kind that touch each unknown, in compressed rows.
-struct Incidence {
-  std::vector<int> begin, element;
-
-  Incidence(int n, Connectivity const& kind) : begin(n + 1, 0), element(kind.vertices.size()) {
-    int const count = static_cast<int>(kind.vertices.size());
-    for (int k = 0; k < count; ++k) {
-      int const v = kind.vertices[k];
-      if (v < 0 || v >= n) {
-        throw Error(
-            "sparse pattern: element {} names unknown {}, but there are {} (0 to {}); check the "
-            "element's vertex indices",
-            k / kind.per_element, v, n, n - 1);
-      }
-      ++begin[v + 1];
-    }
-    std::partial_sum(begin.begin(), begin.end(), begin.begin());
-    std::vector<int> next(begin.begin(), begin.end() - 1);
-    for (int k = 0; k < count; ++k) element[next[kind.vertices[k]]++] = k / kind.per_element;
-  }
-};
-
-void check_shape(Connectivity const& kind) {
+void check(Connectivity const& kind, int n) {
   if (kind.per_element < 1 || kind.vertices.size() % kind.per_element != 0) {
     throw Error(
         "sparse pattern: {} vertex indices are not whole elements of {} vertices; pass all "
@@ -39,15 +16,24 @@ void check_shape(Connectivity const& kind) {
         "of every element",
         kind.vertices.size(), kind.per_element);
   }
+  for (std::size_t k = 0; k < kind.vertices.size(); ++k) {
+    int const v = kind.vertices[k];
+    if (v < 0 || v >= n) {
+      throw Error(
+          "sparse pattern: element {} names unknown {}, but there are {} (0 to {}); check the "
+          "element's vertex indices",
+          k / kind.per_element, v, n, n - 1);
+    }
+  }
 }
 
 }  // namespace
 
 BlockPattern pattern_from_elements(int n, std::span<Connectivity const> kinds) {
-  std::vector<Incidence> incidence;
+  std::vector<Buckets> incidence;  // per kind, the places in `vertices` that name each unknown
   for (Connectivity const& kind : kinds) {
-    check_shape(kind);
-    incidence.emplace_back(n, kind);
+    check(kind, n);
+    incidence.push_back(sort_into_buckets(kind.vertices, n));
   }
 
   BlockPattern pattern;
@@ -60,10 +46,10 @@ BlockPattern pattern_from_elements(int n, std::span<Connectivity const> kinds) {
     seen_in[i] = i;
     for (std::size_t kind = 0; kind < kinds.size(); ++kind) {
       int const size = kinds[kind].per_element;
-      Incidence const& touching = incidence[kind];
-      for (int e = touching.begin[i]; e < touching.begin[i + 1]; ++e) {
-        for (int const j :
-             kinds[kind].vertices.subspan(std::size_t(touching.element[e]) * size, size)) {
+      Buckets const& touching = incidence[kind];
+      for (int k = touching.begin[i]; k < touching.begin[i + 1]; ++k) {
+        int const first = touching.item[k] / size * size;
+        for (int const j : kinds[kind].vertices.subspan(first, size)) {
           if (seen_in[j] == i) continue;
           seen_in[j] = i;
           row.push_back(j);

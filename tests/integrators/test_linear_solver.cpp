@@ -1,6 +1,6 @@
 // Conjugate gradients and the direct solver on systems with known solutions, and on those that have
 // none.
-#include "../core/sparse_samples.hpp"
+#include "../core/sparse/samples.hpp"
 #include "toy_objectives.hpp"
 
 #include <taut/integrators/direct.hpp>

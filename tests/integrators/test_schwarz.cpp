@@ -1,5 +1,5 @@
 // The additive Schwarz preconditioner against its formula in dense matrices, and what it is worth.
-#include "../core/sparse_samples.hpp"
+#include "../core/sparse/samples.hpp"
 #include "toy_objectives.hpp"
 
 #include <taut/core/report/error.hpp>

@@ -2,11 +2,11 @@
 // promise that neither threads nor an interruption change a bit.
 #include "problem.hpp"
 
+#include <support/threads.hpp>
+
 #include <catch2/matchers/catch_matchers_floating_point.hpp>
 
 #include <numbers>
-
-#include <omp.h>
 
 using namespace taut;
 using namespace taut::test;
@@ -192,13 +192,10 @@ TEST_CASE("a large prescribed motion in one step converges", "[truth]") {
 TEST_CASE("results do not depend on the number of threads, bitwise", "[truth]") {
   for (std::string const precision : {"fp64", "mixed", "fp32"}) {
     INFO(precision);
-    std::vector<std::vector<Point>> results;
-    for (int threads : {1, 2}) {
-      omp_set_num_threads(threads);
+    auto const results = on_one_thread_and_all([&] {
       Trial trial("drag", {"solver.precision=" + precision}, true);
-      results.push_back(after(trial, 5));
-    }
-    omp_set_num_threads(2);
+      return after(trial, 5);
+    });
     CHECK(results[0] == results[1]);
   }
 }

@@ -4,9 +4,9 @@
 #include <sys/file.h>
 #include <unistd.h>
 
+#include <core/io/io_samples.hpp>
 #include <cstdint>
 #include <fstream>
-#include <io/io_samples.hpp>
 #include <taut/core/io/file.hpp>
 #include <taut/core/io/vtkhdf.hpp>
 

@@ -1,5 +1,5 @@
 // Logarithms of packs against long double, in units in the last place.
-#include "math_samples.hpp"
+#include "samples.hpp"
 
 #include <taut/core/math/logarithm.hpp>
 

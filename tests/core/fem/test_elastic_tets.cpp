@@ -2,8 +2,9 @@
 // and patch size; and the guarantee that the number of threads does not change a bit.
 #include "elastic_oracle.hpp"
 
+#include <support/threads.hpp>
+#include <taut/core/fem/body.hpp>
 #include <taut/core/fem/elastic_tets.hpp>
-#include <taut/core/fem/ordering.hpp>
 #include <taut/core/fem/shapes.hpp>
 #include <taut/core/potential/potential.hpp>
 #include <taut/core/sparse/operations.hpp>
@@ -13,7 +14,7 @@
 #include <catch2/catch_test_macros.hpp>
 #include <catch2/matchers/catch_matchers_floating_point.hpp>
 
-#include <omp.h>
+#include <algorithm>
 
 using namespace taut;
 using Catch::Matchers::WithinAbs;
@@ -21,13 +22,13 @@ using Catch::Matchers::WithinRel;
 
 namespace {
 
-struct Body {
+struct Sample {
   TetMesh rest;
   std::vector<Point> x;
   std::vector<Point> p;
   std::vector<int> material_of_tet;
 
-  explicit Body(int resolution = 6, double jitter = 0.02) {
+  explicit Sample(int resolution = 6, double jitter = 0.02) {
     TetMesh const mesh = make_shape(BoxShape{{1, 1.2, 0.9}}, resolution);
     Ordering const order = locality_order(mesh);
     for (int v : order.vertices) rest.points.push_back(mesh.points[v]);
@@ -71,7 +72,7 @@ auto host(View const& v) {
 
 /// Compares every sweep with the oracle, to `tolerance` relative to the largest entry.
 template <class Material, class Precision, class S>
-void compare(Body const& body, SweepParams const& params, double tolerance) {
+void compare(Sample const& body, SweepParams const& params, double tolerance) {
   using Term = ElasticTets<Material, Precision, S>;
   Term const term(body.rest, two_materials, body.material_of_tet, params);
   test::ElasticOracle<typename Material::Model, typename Material::Filter> const oracle{
@@ -143,55 +144,200 @@ using Left = Space<Kokkos::DefaultHostExecutionSpace, Kokkos::LayoutLeft>;
 TEMPLATE_TEST_CASE("sweeps agree with the serial oracle", "[fem]", Elastic<StableNeoHookean>,
                    Elastic<FixedCorotated>, (Elastic<Arap, LimitLambda>),
                    (Elastic<StableNeoHookean2018, FullProjection>)) {
-  Body const body;
+  Sample const body;
   SECTION("fp64") { compare<TestType, Fp64, Right>(body, {}, 1e-11); }
   SECTION("mixed") { compare<TestType, Mixed, Right>(body, {}, 2e-4); }
 }
 
 TEST_CASE("neo-Hookean sweeps agree with the serial oracle", "[fem]") {
-  Body const body(6, 0.002);  // no inverted element
+  Sample const body(6, 0.002);  // no inverted element
   compare<Elastic<NeoHookean>, Fp64, Right>(body, {}, 1e-11);
   compare<Elastic<NeoHookean>, Fp32, Right>(body, {}, 1e-3);
 }
 
 TEST_CASE("sweeps do not depend on layout, patch or team size", "[fem]") {
-  Body const body;
+  Sample const body;
   using Material = Elastic<FixedCorotated>;
   compare<Material, Fp64, Left>(body, {.patch_size = 64}, 1e-11);
   compare<Material, Fp64, Right>(body, {.patch_size = 37, .team_size = 1}, 1e-11);
+}
 
-  // Bitwise: the shape of every sum is that of the patches alone.
-  auto const gradient = [&]<class S>(SweepParams const& params) {
-    ElasticTets<Material, Mixed, S> const term(body.rest, two_materials, body.material_of_tet,
-                                               params);
-    auto const x = test::to_field(body.x, VectorField<double, S>());
-    auto const p = test::to_field(body.p, VectorField<float, S>());
-    FixedMask<S> const fixed("fixed", body.x.size());
-    VectorField<float, S> const g("g", body.x.size());
-    BlockField<float, S> const h("h", body.x.size());
-    double const change = term.add_gradient_after(x, p, 1e-3, 1.0, fixed, g, h);
-    std::vector<double> all = {change, term.value(x, 1), term.quadratic_form(x, p, 1)};
-    for (std::size_t i = 0; i < body.x.size(); ++i) {
-      for (int c = 0; c < 3; ++c) all.push_back(g(i, c));
-      for (int c = 0; c < 6; ++c) all.push_back(h(i, c));
-    }
-    return all;
+namespace {
+
+/// Everything that the sweeps of a body give, number after number.
+template <class S>
+std::vector<double> all_results(Sample const& body, SweepParams const& params) {
+  ElasticTets<Elastic<FixedCorotated>, Mixed, S> const term(body.rest, two_materials,
+                                                            body.material_of_tet, params);
+  std::size_t const n = body.x.size();
+  auto const x = test::to_field(body.x, VectorField<double, S>());
+  auto const p = test::to_field(body.p, VectorField<float, S>());
+  FixedMask<S> const fixed("fixed", n);
+  std::vector<double> all = {term.value(x, 1), term.change(x, p, 1e-3, 1),
+                             term.quadratic_form(x, p, 1), term.max_prescribed_step(x, p, 1.0)};
+  auto const append = [&](auto const& field) {
+    auto const f = host(field);
+    for (std::size_t i = 0; i < f.extent(0); ++i)
+      for (std::size_t c = 0; c < f.extent(1); ++c) all.push_back(f(i, c));
   };
-  auto const expected = gradient.operator()<Right>({});
-  CHECK(gradient.operator()<Left>({}) == expected);
-  CHECK(gradient.operator()<Right>({.patch_size = 256, .team_size = 2}) == expected);
-  CHECK(gradient.operator()<Right>({}) == expected);
-  int const threads = omp_get_max_threads();
-  omp_set_num_threads(1);
-  CHECK(gradient.operator()<SerialSpace>({}) == expected);
-  omp_set_num_threads(threads);
+  // One gradient per mode of curvature.
+  VectorField<float, S> const none("none", n), diagonal("diagonal", n), blocks("blocks", n),
+      d("d", n), hp("hp", n);
+  BlockField<float, S> const h("h", n);
+  all.push_back(term.add_gradient_after(x, p, 1e-3, 1.0, fixed, none));
+  all.push_back(term.add_gradient_after(x, p, 1e-3, 1.0, fixed, diagonal, d));
+  all.push_back(term.add_gradient_after(x, p, 1e-3, 1.0, fixed, blocks, h));
+  term.add_product(x, p, 1.0, fixed, hp);
+  for (auto const& field : {none, diagonal, blocks, d, hp}) append(field);
+  append(h);
+  return all;
+}
+
+}  // namespace
+
+TEST_CASE("sweeps are bitwise the same for any layout, team size and number of threads", "[fem]") {
+  // The shape of every sum is that of the patches alone.
+  Sample const body;
+  auto const expected = all_results<Right>(body, {});
+  CHECK(expected[3] > 0);  // the step to the first flat tet
+  CHECK(expected[3] < 1);
+  for (int team : test::team_sizes<Right>()) {
+    CHECK(all_results<Right>(body, {.patch_size = 512, .team_size = team}) == expected);
+    CHECK(all_results<Left>(body, {.patch_size = 512, .team_size = team}) == expected);
+  }
+  test::on_one_thread([&] { CHECK(all_results<Right>(body, {}) == expected); });
+  CHECK(all_results<SerialSpace>(body, {}) == expected);
+}
+
+TEST_CASE("F3: central differences of a mesh's energy and forces close in at second order",
+          "[fem]") {
+  Sample body;
+  // Stretched a little, where nothing is projected.
+  std::vector<Point> const noise = test::random_points(body.x.size(), 1e-3, 5);
+  for (std::size_t i = 0; i < body.x.size(); ++i)
+    for (int c = 0; c < 3; ++c) body.x[i][c] = 1.03 * body.rest.points[i][c] + noise[i][c];
+  using Term = ElasticTets<Elastic<FixedCorotated>, Fp64, Right>;
+  Term const term(body.rest, two_materials, body.material_of_tet);
+  std::size_t const n = body.x.size();
+  auto const p = test::to_field(body.p, Term::Vectors());
+  FixedMask<Right> const fixed("fixed", n);
+  auto const at = [&](double t) {
+    auto const x = test::to_field(body.x, Term::Positions());
+    for (std::size_t i = 0; i < n; ++i)
+      for (int c = 0; c < 3; ++c) x(i, c) += t * p(i, c);
+    return x;
+  };
+  auto const gradient = [&](double t) {
+    Term::Vectors const g("g", n);
+    term.add_gradient(at(t), 1.0, fixed, g);
+    return g;
+  };
+  auto const g = gradient(0);
+  Term::Vectors const hp("hp", n);
+  term.add_product(at(0), p, 1.0, fixed, hp);
+  double slope = 0, curvature = 0;
+  for (std::size_t i = 0; i < n; ++i)
+    for (int c = 0; c < 3; ++c) {
+      slope += g(i, c) * p(i, c);
+      curvature += p(i, c) * hp(i, c);
+    }
+  CHECK_THAT(term.quadratic_form(at(0), p, 1), WithinRel(curvature, 1e-12));
+  auto const energy_error = [&](double h) {
+    return std::abs((term.value(at(h), 1) - term.value(at(-h), 1)) / (2 * h) - slope);
+  };
+  auto const force_error = [&](double h) {
+    auto const after = gradient(h), before = gradient(-h);
+    double sum = 0;
+    for (std::size_t i = 0; i < n; ++i)
+      for (int c = 0; c < 3; ++c) {
+        sum += square((after(i, c) - before(i, c)) / (2 * h) - hp(i, c));
+      }
+    return std::sqrt(sum);
+  };
+  CHECK_THAT(std::log2(energy_error(2e-3) / energy_error(1e-3)), WithinAbs(2, 0.1));
+  CHECK_THAT(std::log2(force_error(2e-3) / force_error(1e-3)), WithinAbs(2, 0.1));
+}
+
+TEST_CASE("F2: elastic forces have neither a resultant nor a torque", "[fem]") {
+  Sample const body;
+  using Term = ElasticTets<Elastic<FixedCorotated>, Fp64, Right>;
+  Term const term(body.rest, two_materials, body.material_of_tet);
+  std::size_t const n = body.x.size();
+  auto const x = test::to_field(body.x, Term::Positions());
+  FixedMask<Right> const fixed("fixed", n);
+  Term::Vectors const g("g", n);
+  term.add_gradient(x, 1.0, fixed, g);
+  Vec3<double> force{}, torque{};
+  double force_size = 0, torque_size = 0;
+  for (std::size_t i = 0; i < n; ++i) {
+    Vec3<double> const f = {g(i, 0), g(i, 1), g(i, 2)}, r = {x(i, 0), x(i, 1), x(i, 2)};
+    force = force + f;
+    torque = torque + cross(r, f);
+    force_size += norm(f);
+    torque_size += norm(r) * norm(f);
+  }
+  CHECK(norm(force) < 1e-14 * force_size);
+  CHECK(norm(torque) < 1e-14 * torque_size);
+
+  // A body that was turned rigidly bears no forces at all.
+  Sample turned;
+  double const c = std::cos(2.0), s = std::sin(2.0);
+  for (std::size_t i = 0; i < n; ++i) {
+    Point const& X = turned.rest.points[i];
+    turned.x[i] = {c * X[0] - s * X[1] + 5, s * X[0] + c * X[1], X[2] - 3};
+  }
+  Kokkos::deep_copy(g, 0);
+  term.add_gradient(test::to_field(turned.x, Term::Positions()), 1.0, fixed, g);
+  double largest_force = 0;
+  for (std::size_t i = 0; i < n; ++i)
+    for (int k = 0; k < 3; ++k) largest_force = std::max(largest_force, std::abs(g(i, k)));
+  CHECK(largest_force < 1e-11 * force_size);
+}
+
+TEST_CASE("a shuffled mesh gives the same results in the input's order", "[fem]") {
+  TetMesh const mesh = make_shape(BoxShape{{1, 1.2, 0.9}}, 5);
+  std::size_t const n = mesh.points.size();
+  std::mt19937 random(8);
+  std::vector<std::int32_t> to(n);
+  for (std::size_t i = 0; i < n; ++i) to[i] = static_cast<std::int32_t>(i);
+  std::shuffle(to.begin(), to.end(), random);
+  TetMesh shuffled = mesh;
+  for (std::size_t i = 0; i < n; ++i) shuffled.points[to[i]] = mesh.points[i];
+  for (Tet& tet : shuffled.tets)
+    for (std::int32_t& v : tet) v = to[v];
+  std::shuffle(shuffled.tets.begin(), shuffled.tets.end(), random);
+
+  auto const forces = [&](TetMesh const& input) {
+    Body<Fp64, Right> const body(input, 1000);
+    CHECK(body.in_input_order(body.positions()) == input.points);
+    ElasticTets<Elastic<FixedCorotated>, Fp64, Right> const term(body.rest, two_materials[0]);
+    auto const x = body.positions();
+    for (std::size_t i = 0; i < n; ++i) {
+      double const X = x(i, 0), Y = x(i, 1), Z = x(i, 2);
+      x(i, 0) = 1.1 * X + 0.3 * Y * Y;
+      x(i, 1) = Y + 0.2 * std::sin(3 * Z);
+      x(i, 2) = 0.8 * Z - 0.1 * X * Y;
+    }
+    FixedMask<Right> const fixed("fixed", n);
+    VectorField<double, Right> const g("g", n);
+    term.add_gradient(x, 1.0, fixed, g);
+    return body.in_input_order(g);
+  };
+  auto const expected = forces(mesh), found = forces(shuffled);
+  double const unit = largest(expected);
+  double worst = 0;
+  for (std::size_t i = 0; i < n; ++i)
+    for (int c = 0; c < 3; ++c) {
+      worst = std::max(worst, std::abs(found[to[i]][c] - expected[i][c]));
+    }
+  CHECK(worst < 1e-13 * unit);
 }
 
 TEST_CASE("the assembled Hessian is the matrix-free one, and fixed rows are left alone", "[fem]") {
-  Body const body;
-  using Term = ElasticTets<Elastic<FixedCorotated>, Fp64>;
+  Sample const body;
+  using Term = ElasticTets<Elastic<FixedCorotated>, Fp64, Right>;
   std::vector<double> const mass(body.x.size(), 2.0);
-  Unknowns<Fp64> const unknowns(mass, 0.1);
+  Unknowns<Fp64, Right> const unknowns(mass, 0.1);
   for (std::size_t i = 0; i < body.x.size(); i += 5) unknowns.fixed(i) = 1;
   Potential potential(unknowns, Inertia(unknowns), Term(body.rest, two_materials[1]));
   potential.begin_step(0.01, 0.1, true);
@@ -216,8 +362,8 @@ TEST_CASE("the assembled Hessian is the matrix-free one, and fixed rows are left
 }
 
 TEST_CASE("the largest step stops where the first tet is flat", "[fem]") {
-  Body const body(4, 0.0);
-  using Term = ElasticTets<Elastic<NeoHookean>, Fp64>;
+  Sample const body(4, 0.0);
+  using Term = ElasticTets<Elastic<NeoHookean>, Fp64, Right>;
   Term const term(body.rest, two_materials[0]);
   auto const x = test::to_field(body.rest.points, Term::Positions());
   auto const p = test::to_field(body.p, Term::Vectors());
@@ -246,32 +392,4 @@ TEST_CASE("the largest step stops where the first tet is flat", "[fem]") {
   for (std::size_t i = 0; i < body.x.size(); ++i)
     for (int c = 0; c < 3; ++c) p(i, c) = 1 + x(i, c);
   CHECK(term.max_step(x, p, infinity) == infinity);
-}
-
-TEST_CASE("where a cubic first vanishes", "[fem]") {
-  constexpr double infinity = std::numeric_limits<double>::infinity();
-  CHECK(smallest_positive_root(1, 0, 0, 0) == infinity);
-  CHECK(smallest_positive_root(1, 1, 1, 1) == infinity);
-  CHECK(smallest_positive_root(0, 1, 0, 0) == 0);
-  CHECK(smallest_positive_root(1, std::nan(""), 0, 0) == 0);
-  std::mt19937 rng(5);
-  std::uniform_real_distribution<double> uniform(-1, 1);
-  for (int k = 0; k < 100000; ++k) {
-    // Roots of known size; the polynomial is scaled to be positive at 0.
-    double const size = std::pow(10.0, 6 * uniform(rng));
-    double r[3] = {size * uniform(rng), size * uniform(rng), size * uniform(rng)};
-    if (k % 10 == 0) r[1] = r[0];  // double roots: touched, perhaps not crossed
-    double const s = -r[0] * r[1] * r[2] > 0 ? 1 : -1;
-    double const a = -s * r[0] * r[1] * r[2], b = s * (r[0] * r[1] + r[1] * r[2] + r[2] * r[0]),
-                 c = -s * (r[0] + r[1] + r[2]);
-    double expected = infinity;
-    for (double root : r) expected = root > 0 ? std::min(expected, root) : expected;
-    double const found = smallest_positive_root(a, b, c, s);
-    if (k % 10 == 0 && found > expected * (1 + 1e-6)) {
-      // A double root may be missed by rounding, where the polynomial only touches zero.
-      CHECK_THAT(r[0], WithinRel(expected, 1e-6));
-      continue;
-    }
-    CHECK_THAT(found, WithinRel(expected, 1e-6));
-  }
 }

@@ -1,6 +1,6 @@
 // Symmetric eigenvalue problems of size 3, 4, 9 and 12 against Eigen's solver, and the projection
 // onto positive semi-definite matrices.
-#include "math_samples.hpp"
+#include "samples.hpp"
 
 #include <taut/core/math/psd_projection.hpp>
 
@@ -190,6 +190,111 @@ TEMPLATE_TEST_CASE("symmetric matrices of other sizes", "[math]", float, double)
   check_square<TestType, 4>();
   check_square<TestType, 9>();
   check_square<TestType, 12>();
+}
+
+namespace {
+
+/// How far a decomposition and a projection are from what they should be, without a reference.
+struct Errors {
+  Worst orthogonal, product, projection;
+  template <class Real, int N>
+  void see(SquareMatrix<Real, N> const& a) {
+    SquareEigen<Real, N> const e = symmetric_eigen(a);
+    SquareMatrix<Real, N> const p = project_psd(a);
+    // Real is float, or the entries are fp64 and so are the errors of this check.
+    auto const unit = [](int i, int j) { return i == j ? 1.0 : 0.0; };
+    for (int j = 0; j < N; ++j)
+      for (int i = 0; i <= j; ++i) {
+        double dots = -unit(i, j), sum = -double(a(i, j)), raised = -double(p(i, j));
+        for (int k = 0; k < N; ++k) {
+          double const v = double(e.vectors(i, k)) * double(e.vectors(j, k));
+          dots += double(e.vectors(k, i)) * double(e.vectors(k, j));
+          sum += double(e.values[k]) * v;
+          raised += std::max(double(e.values[k]), 0.0) * v;
+        }
+        orthogonal.see(dots);
+        product.see(sum);
+        projection.see(raised);
+      }
+  }
+};
+
+template <class Real, int N>
+void check_many(int count) {
+  Random random(40 + N);
+  Errors errors;
+  std::uniform_real_distribution<Real> uniform(-1, 1);
+  for (int repeat = 0; repeat < count; ++repeat) {
+    SquareMatrix<Real, N> a;
+    for (int j = 0; j < N; ++j)
+      for (int i = 0; i <= j; ++i) a(i, j) = a(j, i) = uniform(random);
+    errors.see(a);
+  }
+  INFO("N = " << N);
+  CHECK(errors.orthogonal.value() < 4 * N * epsilon<Real>);
+  CHECK(errors.product.value() < 4 * N * epsilon<Real>);
+  CHECK(errors.projection.value() < 6 * N * epsilon<Real>);
+}
+
+template <class Real, int N>
+SquareMatrix<Real, N> diagonal_matrix(double const (&entries)[N]) {
+  SquareMatrix<Real, N> a{};
+  for (int k = 0; k < N; ++k) a(k, k) = static_cast<Real>(entries[k]);
+  return a;
+}
+
+/// The reflection I - 2 u u' with u = (1, 2, ..., N) / |.|, a dense orthogonal matrix, applied from
+/// both sides.
+template <class Real, int N>
+SquareMatrix<Real, N> turned(SquareMatrix<Real, N> const& a) {
+  double norm2 = 0;
+  for (int k = 1; k <= N; ++k) norm2 += k * k;
+  auto const q = [&](int i, int j) { return (i == j) - 2.0 * (i + 1) * (j + 1) / norm2; };
+  SquareMatrix<Real, N> r;
+  for (int j = 0; j < N; ++j)
+    for (int i = 0; i < N; ++i) {
+      double sum = 0;
+      for (int k = 0; k < N; ++k) sum += q(i, k) * double(a(k, k)) * q(j, k);
+      r(i, j) = static_cast<Real>(sum);
+    }
+  return r;
+}
+
+}  // namespace
+
+TEMPLATE_TEST_CASE("a million random symmetric matrices", "[math]", float, double) {
+  check_many<TestType, 3>(2 * many);
+  check_many<TestType, 9>(many / 25);
+  check_many<TestType, 12>(many / 50);
+}
+
+TEMPLATE_TEST_CASE("a projection is positive where a negative eigenvalue dwarfs the others",
+                   "[math]", float, double) {
+  using Real = TestType;
+  for (double dwarf : {1e3, 1e8, 1e20, 1e30}) {
+    // Also at the matrix's scale nothing of the dwarf is left but the rounding of the eigenvectors.
+    double const entries[3] = {1, 2, -dwarf};
+    SquareMatrix<Real, 3> const a = turned(diagonal_matrix<Real, 3>(entries));
+    Sym3<Real> const p =
+        project_psd(Sym3<Real>{{a(0, 0), a(1, 1), a(2, 2), a(0, 1), a(1, 2), a(0, 2)}});
+    SymmetricEigen<Real> const e = symmetric_eigen(p);
+    CHECK(e.values[2] >= -32 * epsilon<Real> * e.values[0]);
+    CHECK(e.values[0] <= 3 + 32 * epsilon<Real> * dwarf);
+
+    double const nine[9] = {1, 2, -dwarf, 3, -1, 0, 5, -dwarf, 2};
+    SquareEigen<Real, 9> const f =
+        symmetric_eigen(project_psd(turned(diagonal_matrix<Real, 9>(nine))));
+    Real smallest = f.values[0], largest = f.values[0];
+    for (Real value : f.values) {
+      smallest = std::min(smallest, value);
+      largest = std::max(largest, value);
+    }
+    CHECK(smallest >= -32 * epsilon<Real> * largest);
+    CHECK(largest <= 6 + 64 * epsilon<Real> * dwarf);
+  }
+  // All negative: nothing is left.
+  Sym3<Real> const none = project_psd(Sym3<Real>{{-1, -2, -3, Real(0.5), 0, 0}});
+  for (Real entry : none.s) CHECK(std::abs(entry) <= 8 * epsilon<Real>);
 }
 
 TEST_CASE("a positive semi-definite matrix is projected onto itself, to the bit", "[math]") {

@@ -1,7 +1,7 @@
 // report.jsonl, summary.json and the progress line.
 #include <cmath>
+#include <core/io/io_samples.hpp>
 #include <cstdint>
-#include <io/io_samples.hpp>
 #include <limits>
 #include <nlohmann/json.hpp>
 #include <taut/core/io/file.hpp>

@@ -1,6 +1,6 @@
 // The drawing of matrices and the answers of Eigen, which is slow to compile: the tests of the
 // decompositions share this file.
-#include "math_samples.hpp"
+#include "samples.hpp"
 
 #include <Eigen/Eigenvalues>
 #include <Eigen/SVD>

@@ -7,10 +7,10 @@
 
 #include <array>
 #include <chrono>
+#include <core/io/io_samples.hpp>
 #include <csignal>
 #include <cstdint>
 #include <functional>
-#include <io/io_samples.hpp>
 #include <random>
 #include <taut/core/io/checkpoint.hpp>
 #include <taut/core/io/file.hpp>

@@ -1,7 +1,7 @@
 // Files that are no mesh: one sentence each that says where, what and how to mend it.
 #include <algorithm>
+#include <core/io/io_samples.hpp>
 #include <cstdint>
-#include <io/io_samples.hpp>
 #include <limits>
 #include <taut/core/io/file.hpp>
 #include <taut/core/io/mesh_reader.hpp>

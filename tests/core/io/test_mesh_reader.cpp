@@ -1,8 +1,8 @@
 // Every format read back to the mesh that was written, bit for bit.
 #include <array>
+#include <core/io/io_samples.hpp>
 #include <cstdint>
 #include <fstream>
-#include <io/io_samples.hpp>
 #include <support/data.hpp>
 #include <taut/core/fem/mesh_check.hpp>
 #include <taut/core/io/file.hpp>

@@ -1,6 +1,6 @@
 // The rotation-variant singular value decomposition against Eigen's, for every kind of F, in
 // scalars and in packs.
-#include "math_samples.hpp"
+#include "samples.hpp"
 
 #include <taut/core/math/svd.hpp>
 

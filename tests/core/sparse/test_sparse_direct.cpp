@@ -1,5 +1,5 @@
 // The sparse direct solver against Gaussian elimination.
-#include "sparse_samples.hpp"
+#include "samples.hpp"
 
 #include <taut/core/report/error.hpp>
 #include <taut/core/sparse/direct_solver.hpp>

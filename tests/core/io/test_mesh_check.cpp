@@ -1,8 +1,8 @@
 // What check_mesh refuses, mends and warns of.
 #include <array>
 #include <cmath>
+#include <core/io/io_samples.hpp>
 #include <cstdint>
-#include <io/io_samples.hpp>
 #include <limits>
 #include <taut/core/fem/mesh_check.hpp>
 

@@ -1,7 +1,7 @@
 // Checkpoints come back bitwise, or not at all.
 #include <bit>
+#include <core/io/io_samples.hpp>
 #include <cstdint>
-#include <io/io_samples.hpp>
 #include <limits>
 #include <taut/core/io/checkpoint.hpp>
 #include <taut/core/io/file.hpp>

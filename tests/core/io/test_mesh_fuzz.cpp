@@ -1,9 +1,9 @@
 // Damaged mesh files: whatever a reader is given, it returns a mesh or throws taut::Error.
 // Sanitizers watch the rest (preset serial-debug).
 #include <array>
+#include <core/io/io_samples.hpp>
 #include <cstdint>
 #include <functional>
-#include <io/io_samples.hpp>
 #include <random>
 #include <taut/core/fem/mesh_check.hpp>
 #include <taut/core/io/mesh_reader.hpp>

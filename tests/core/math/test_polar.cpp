@@ -1,6 +1,6 @@
 // The polar decomposition and its derivative: orthogonality, symmetry and nearness for every kind
 // of F, in scalars and in packs.
-#include "math_samples.hpp"
+#include "samples.hpp"
 
 #include <taut/core/math/svd.hpp>
 
@@ -174,16 +174,13 @@ TEMPLATE_TEST_CASE("the rotation's derivative is bounded and positive definite f
       Mat3<T> const inverses = to_matrix(rotation_gradient(S));
       for (int i = 0; i < ScalarTraits<T>::lanes; ++i) {
         Wide const W = wide(inverses, i), s = wide(S, i);
-        if (frobenius(s) == 0) {
-          bound.see(frobenius(W) < 1e-3 * std::numeric_limits<ValueType<T>>::max() ? 0 : 1);
-          continue;
-        }
         std::vector<long double> const eigenvalues = eigen_symmetric(W.a, 3).values;
         indefinite.see(std::min(0.0L, eigenvalues[0] / eigenvalues[2]));
-        bound.see(eigenvalues[2] * epsilon<T> * trace(s));
-        // G W = I up to the shift of G by 32 epsilon tr S and to rounding.
+        long double const size = 1 + trace(s);
+        bound.see(eigenvalues[2] * epsilon<T> * size);
+        // G W = I up to the shift of G by 32 epsilon (1 + tr S) and to rounding.
         Wide const G = trace(s) * identity3<long double>() - 0.5L * (s + transpose(s));
-        inverse.see(frobenius(G * W - identity3<long double>()) / (trace(s) * frobenius(W)));
+        inverse.see(frobenius(G * W - identity3<long double>()) / (size * frobenius(W)));
       }
     });
     INFO(family.name);
@@ -191,6 +188,18 @@ TEMPLATE_TEST_CASE("the rotation's derivative is bounded and positive definite f
     CHECK(bound.value() < 1.0 / 16);
     CHECK(inverse.value() < 64 * epsilon<T>);
   }
+}
+
+TEMPLATE_TEST_CASE("sums of stretches are at least their floor, and themselves above it", "[math]",
+                   float, double) {
+  using T = TestType;
+  T const eps = static_cast<T>(epsilon<T>);
+  CHECK(floored_sum(T(0.5), T(0.25), Vec3<T>{{1, T(0.5), T(0.25)}}) == T(0.75));
+  CHECK(floored_sum(T(0), T(0), Vec3<T>{{0, 0, 0}}) == 32 * eps);
+  CHECK(floored_sum(T(1), T(-1), Vec3<T>{{3, 1, -1}}) == 128 * eps);
+  // A point of an element: its inverse is that of the floor.
+  Sym3<T> const inverse = rotation_gradient(Mat3<T>{});
+  for (int k = 0; k < 6; ++k) CHECK(inverse.s[k] == (k < 3 ? 1 / (32 * eps) : T(0)));
 }
 
 TEMPLATE_TEST_CASE("stretch_sum is the trace of S", "[math]", float, double, HostPack<float>,

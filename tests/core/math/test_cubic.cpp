@@ -1,0 +1,41 @@
+// The smallest positive root of a cubic, against roots that are chosen.
+#include <taut/core/math/cubic.hpp>
+
+#include <catch2/catch_test_macros.hpp>
+#include <catch2/matchers/catch_matchers_floating_point.hpp>
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <random>
+
+using namespace taut;
+using Catch::Matchers::WithinRel;
+
+TEST_CASE("where a cubic first vanishes", "[math]") {
+  constexpr double infinity = std::numeric_limits<double>::infinity();
+  CHECK(smallest_positive_root(1, 0, 0, 0) == infinity);
+  CHECK(smallest_positive_root(1, 1, 1, 1) == infinity);
+  CHECK(smallest_positive_root(0, 1, 0, 0) == 0);
+  CHECK(smallest_positive_root(1, std::nan(""), 0, 0) == 0);
+  std::mt19937 rng(5);
+  std::uniform_real_distribution<double> uniform(-1, 1);
+  for (int k = 0; k < 100000; ++k) {
+    // Roots of known size; the polynomial is scaled to be positive at 0.
+    double const size = std::pow(10.0, 6 * uniform(rng));
+    double r[3] = {size * uniform(rng), size * uniform(rng), size * uniform(rng)};
+    if (k % 10 == 0) r[1] = r[0];  // double roots: touched, perhaps not crossed
+    double const s = -r[0] * r[1] * r[2] > 0 ? 1 : -1;
+    double const a = -s * r[0] * r[1] * r[2], b = s * (r[0] * r[1] + r[1] * r[2] + r[2] * r[0]),
+                 c = -s * (r[0] + r[1] + r[2]);
+    double expected = infinity;
+    for (double root : r) expected = root > 0 ? std::min(expected, root) : expected;
+    double const found = smallest_positive_root(a, b, c, s);
+    if (k % 10 == 0 && found > expected * (1 + 1e-6)) {
+      // A double root may be missed by rounding, where the polynomial only touches zero.
+      CHECK_THAT(r[0], WithinRel(expected, 1e-6));
+      continue;
+    }
+    CHECK_THAT(found, WithinRel(expected, 1e-6));
+  }
+}

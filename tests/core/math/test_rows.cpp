@@ -1,0 +1,91 @@
+// Rows of four in memory, loaded to and added from packs, against loops over single numbers.
+#include <taut/core/math/rows.hpp>
+
+#include <catch2/catch_template_test_macros.hpp>
+#include <catch2/catch_test_macros.hpp>
+
+#include <random>
+#include <vector>
+
+using namespace taut;
+
+namespace {
+
+template <class T>
+struct Rows {
+  using Real = ValueType<T>;
+  static constexpr int lanes = ScalarTraits<T>::lanes, count = 3 * lanes;
+
+  std::mt19937 random{11};
+  std::vector<std::uint16_t> begin = std::vector<std::uint16_t>(lanes);
+
+  Real number() { return static_cast<Real>(std::uniform_real_distribution<double>(-1, 1)(random)); }
+  std::vector<Real> numbers(int n) {
+    std::vector<Real> all(n);
+    for (Real& v : all) v = number();
+    return all;
+  }
+  /// Rows for the lanes: all different, any, or all the same.
+  void draw(int repeat) {
+    for (int i = 0; i < lanes; ++i) {
+      int const row = repeat % 3 == 0   ? (i * 5 + repeat) % count
+                      : repeat % 3 == 1 ? static_cast<int>(random() % count)
+                                        : repeat % count;
+      begin[i] = static_cast<std::uint16_t>(4 * row);
+    }
+  }
+};
+
+template <int numbers, int scale, class T>
+void check_add(Rows<T>& rows) {
+  using Real = ValueType<T>;
+  constexpr int lanes = ScalarTraits<T>::lanes;
+  for (int repeat = 0; repeat < 30; ++repeat) {
+    rows.draw(repeat);
+    // `row` holds four numbers, whatever is used of them.
+    T row[4];
+    std::vector<Real> const source = rows.numbers(4 * lanes);
+    for (int c = 0; c < 4; ++c) row[c] = load<T>(source.data() + c * lanes);
+    std::vector<Real> to = rows.numbers(4 * scale * rows.count + 4), expected = to;
+    for (int i = 0; i < lanes; ++i)
+      for (int c = 0; c < numbers; ++c) {
+        expected[scale * rows.begin[i] + c] += source[c * lanes + i];
+      }
+    add_rows<numbers, scale>(row, to.data(), rows.begin.data());
+    if (to != expected) FAIL(numbers << " numbers, scale " << scale << ", repeat " << repeat);
+  }
+}
+
+template <int scale, class T>
+void check_scale(Rows<T>& rows) {
+  check_add<1, scale>(rows);
+  check_add<2, scale>(rows);
+  check_add<3, scale>(rows);
+  check_add<4, scale>(rows);
+}
+
+}  // namespace
+
+TEMPLATE_TEST_CASE("load_rows is a gather of three numbers", "[math]", float, double,
+                   HostPack<float>, HostPack<double>) {
+  using T = TestType;
+  Rows<T> rows;
+  std::vector<ValueType<T>> const from = rows.numbers(4 * rows.count);
+  for (int repeat = 0; repeat < 300; ++repeat) {
+    rows.draw(repeat);
+    T to[3];
+    load_rows(from.data(), rows.begin.data(), to);
+    for (int c = 0; c < 3; ++c)
+      for (int i = 0; i < rows.lanes; ++i) {
+        if (lane(to[c], i) != from[rows.begin[i] + c]) FAIL("number " << c << " of lane " << i);
+      }
+  }
+}
+
+TEMPLATE_TEST_CASE("add_rows adds lane after lane, also to one row", "[math]", float, double,
+                   HostPack<float>, HostPack<double>) {
+  Rows<TestType> rows;
+  check_scale<1>(rows);
+  check_scale<2>(rows);
+  check_scale<3>(rows);
+}
