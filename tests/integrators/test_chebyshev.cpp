@@ -80,7 +80,7 @@ TEST_CASE("Chebyshev finds the minimum, with all preconditioners") {
 }
 
 TEST_CASE("with a measured radius it needs a third of the iterations of gradient descent") {
-  toy::Chain<toy::Anisotropic> chain({.size = 20}, {.stiffest = 200});
+  toy::Chain<toy::Anisotropic> chain({.size = 20}, {.stiffest = 60});
   Method::Params params;
   params.chebyshev.rho = 0;
   params.preconditioner = AnyPreconditioner<Fp64>::by_name("jacobi");
