@@ -37,6 +37,15 @@ struct MoveAlong {
   }
 };
 
+/// p = -p
+template <class P, class S>
+struct Reverse {
+  VectorField<typename P::real, S> p;
+  KOKKOS_FUNCTION void operator()(int i) const {
+    for (int c = 0; c < 3; ++c) p(i, c) = -p(i, c);
+  }
+};
+
 template <class P, class S>
 struct Dot {
   VectorField<typename P::real, S> a, b;
@@ -46,9 +55,9 @@ struct Dot {
   }
 };
 
-template <class P, class S>
+template <class Field>
 struct LargestNorm {
-  VectorField<typename P::real, S> p;
+  Field p;
   KOKKOS_FUNCTION void operator()(int i, double& largest) const {
     largest = Kokkos::max(largest, norm(load3<double>(p, i)));
   }
@@ -63,11 +72,18 @@ struct DescentFields {
   Vectors gradient, gradient_before;          ///< at x, and where the last step began
   Vectors direction;                          ///< p
   VectorField<typename P::position, S> from;  ///< where the last step began
+  /// Where the minimisation began, or prescribed unknowns were last moved; only without inertia.
+  VectorField<typename P::position, S> origin;
   Array<typename P::real, S> mass;
   Reducer<S, typename P::sum> reducer;
 
   int size() const { return static_cast<int>(direction.extent(0)); }
-  void resize(int n) {
+  /// Allocates what is not there already.
+  void resize(int n, bool with_origin = false) {
+    if (with_origin && static_cast<int>(origin.extent(0)) != n) {
+      origin = VectorField<typename P::position, S>("origin", n);
+    }
+    if (size() == n) return;
     gradient = Vectors("gradient", n);
     gradient_before = Vectors("gradient_before", n);
     direction = Vectors("direction", n);

@@ -2,7 +2,7 @@
 //
 // The two-loop recursion is carried out on coefficients: with the products s_i'g, s_i'y_j and
 // y_i'P q known, both loops are a few operations on the host, and each iteration makes four passes
-// over the unknowns whatever the window.
+// over the unknowns for windows up to 8, two more for each 8 pairs beyond.
 #pragma once
 
 #include <taut/core/report/error.hpp>
@@ -13,7 +13,7 @@
 namespace taut {
 
 /// Pairs kept at most.
-inline constexpr int max_lbfgs_window = 8;
+inline constexpr int max_lbfgs_window = 20;
 
 namespace kernels {
 
@@ -22,21 +22,25 @@ template <class P, class S>
 struct PairHistory {
   using Real = typename P::real;
   using Slots = Kokkos::View<Real** [3], typename S::layout, typename S::memory>;
+  /// Slots whose products are summed in one pass: what fits into a thread's registers.
+  static constexpr int per_pass = 8;
+
   Slots s, y;
   int count;  ///< slots 0 .. count - 1 are in use
 
+  KOKKOS_FUNCTION int last_of_pass(int first) const { return Kokkos::min(first + per_pass, count); }
   KOKKOS_FUNCTION static Vec3<Real> at(Slots const& slots, int i, int slot) {
     return {slots(i, slot, 0), slots(i, slot, 1), slots(i, slot, 2)};
   }
 };
 
-/// Writes the last step into slot `newest`, and sums s_j'g, s_j'y_newest, s_newest'y_j for all
-/// slots j, and g' M^-1 g. The newest slot takes part unless it is -1.
+/// Writes the last step into slot `newest`, and sums s_j'g, s_j'y_newest, s_newest'y_j for the
+/// slots of a pass from `first` on, and g' M^-1 g. The newest slot takes part unless it is -1.
 template <class P, class S>
 struct PairDots {
-  static constexpr int count = 3 * max_lbfgs_window + 1;
+  static constexpr int count = 3 * PairHistory<P, S>::per_pass + 1;
   PairHistory<P, S> history;
-  int newest;
+  int first, newest;
   typename P::real length;
   VectorField<typename P::real, S> gradient, gradient_before, p;
   Array<typename P::real, S> mass;
@@ -54,12 +58,13 @@ struct PairDots {
       }
     }
     auto const g = load3<Sum>(gradient, i);
-    for (int j = 0; j < history.count; ++j) {
+    for (int j = first; j < history.last_of_pass(first); ++j) {
       auto const sj = convert<Sum>(history.at(history.s, i, j));
       auto const yj = convert<Sum>(history.at(history.y, i, j));
-      sums[3 * j] += dot(sj, g);
-      sums[3 * j + 1] += dot(sj, convert<Sum>(y));
-      sums[3 * j + 2] += dot(convert<Sum>(s), yj);
+      int const k = 3 * (j - first);
+      sums[k] += dot(sj, g);
+      sums[k + 1] += dot(sj, convert<Sum>(y));
+      sums[k + 2] += dot(convert<Sum>(s), yj);
     }
     Sum const gg = dot(g, g);
     if (gg > 0) sums[count - 1] += gg / Sum(mass(i));
@@ -82,16 +87,18 @@ struct SubtractChanges {
   }
 };
 
-/// y_j'r
+/// y_j'r for the slots of a pass.
 template <class P, class S>
 struct ChangeDots {
+  static constexpr int count = PairHistory<P, S>::per_pass;
   PairHistory<P, S> history;
+  int first;
   VectorField<typename P::real, S> r;
-  KOKKOS_FUNCTION void operator()(int i, Sums<typename P::sum, max_lbfgs_window>& sums) const {
+  KOKKOS_FUNCTION void operator()(int i, Sums<typename P::sum, count>& sums) const {
     using Sum = typename P::sum;
     auto const ri = load3<Sum>(r, i);
-    for (int j = 0; j < history.count; ++j)
-      sums[j] += dot(convert<Sum>(history.at(history.y, i, j)), ri);
+    for (int j = first; j < history.last_of_pass(first); ++j)
+      sums[j - first] += dot(convert<Sum>(history.at(history.y, i, j)), ri);
   }
 };
 
@@ -157,17 +164,27 @@ public:
     Heading heading;
     int const slot = restarted_ ? -1 : (newest_ + 1) % params_.window;
     history_.count = std::max(history_.count, slot + 1);
-    auto const dots = reducer_.template sum<Dots::count>(
-        "pair_dots", fields.size(),
-        Dots{history_, slot, typename P::real(last.length), fields.gradient, fields.gradient_before,
-             fields.direction, fields.mass});
-    if (slot >= 0) heading.lost = !keep(slot, dots, std::abs(last.length * slope_));
+    PairCoefficients s_g{}, s_y{}, y_s{}, y_r{};
+    for (int first = 0; first == 0 || first < history_.count; first += History::per_pass) {
+      auto const dots = reducer_.template sum<Dots::count>(
+          "pair_dots", fields.size(),
+          Dots{history_, first, slot, typename P::real(last.length), fields.gradient,
+               fields.gradient_before, fields.direction, fields.mass});
+      heading.gradient = double(dots[Dots::count - 1]);
+      for (int j = first; j < history_.last_of_pass(first); ++j) {
+        int const k = 3 * (j - first);
+        s_g[j] = double(dots[k]);
+        s_y[j] = double(dots[k + 1]);
+        y_s[j] = double(dots[k + 2]);
+      }
+    }
+    if (slot >= 0) heading.skipped = !keep(slot, s_y, y_s, std::abs(last.length * slope_));
     restarted_ = false;
 
     PairCoefficients a{}, c{};
     for (int k = 0; k < pairs_; ++k) {
       int const i = slot_of_age(k);
-      a[i] = double(dots[3 * i]);
+      a[i] = s_g[i];
       for (int l = 0; l < k; ++l) a[i] -= a[slot_of_age(l)] * s_y_[i][slot_of_age(l)];
       a[i] /= s_y_[i][i];
     }
@@ -175,11 +192,15 @@ public:
     for_each<S>("subtract_changes", fields.size(),
                 kernels::SubtractChanges<P, S>{history_, a, fields.gradient, q});
     preconditioner.apply(q, fields.direction);
-    auto const y_r = reducer_.template sum<max_lbfgs_window>(
-        "change_dots", fields.size(), kernels::ChangeDots<P, S>{history_, fields.direction});
+    using ChangeDots = kernels::ChangeDots<P, S>;
+    for (int first = 0; first < history_.count; first += History::per_pass) {
+      auto const dots = reducer_.template sum<ChangeDots::count>(
+          "change_dots", fields.size(), ChangeDots{history_, first, fields.direction});
+      for (int j = first; j < history_.last_of_pass(first); ++j) y_r[j] = double(dots[j - first]);
+    }
     for (int k = pairs_ - 1; k >= 0; --k) {
       int const i = slot_of_age(k);
-      double b = double(y_r[i]);
+      double b = y_r[i];
       for (int l = k + 1; l < pairs_; ++l) b += c[slot_of_age(l)] * s_y_[slot_of_age(l)][i];
       c[i] = a[i] - b / s_y_[i][i];
     }
@@ -188,9 +209,8 @@ public:
         kernels::AddSteps<P, S>{history_, c, fields.gradient, fields.direction, fields.mass});
 
     heading.slope = slope_ = double(sums[0]);
-    heading.descent = -heading.slope;
+    heading.descent = std::abs(heading.slope);  // positive definite: any descent will do
     heading.metric = double(sums[1]);
-    heading.gradient = double(dots[Dots::count - 1]);
     heading.steepest = pairs_ == 0;
     heading.first_length = heading.steepest || params_.newton_step ? 0 : 1;
     return heading;
@@ -204,18 +224,17 @@ private:
   int slot_of_age(int k) const { return (newest_ - k + params_.window) % params_.window; }
 
   /// Takes the pair in `slot` into the history if s'y > 0; the pair that was there before is gone.
-  template <class Dots_>
-  bool keep(int slot, Dots_ const& dots, double slope_along_step) {
-    double const s_y = double(dots[3 * slot + 1]);
-    if (!(s_y > params_.least_curvature * slope_along_step)) {
+  bool keep(int slot, PairCoefficients const& s_y, PairCoefficients const& y_s,
+            double slope_along_step) {
+    if (!(s_y[slot] > params_.least_curvature * slope_along_step)) {
       pairs_ = std::min(pairs_, params_.window - 1);
       return false;
     }
     newest_ = slot;
     pairs_ = std::min(pairs_ + 1, params_.window);
     for (int j = 0; j < history_.count; ++j) {
-      s_y_[j][slot] = double(dots[3 * j + 1]);
-      s_y_[slot][j] = double(dots[3 * j + 2]);
+      s_y_[j][slot] = s_y[j];
+      s_y_[slot][j] = y_s[j];
     }
     return true;
   }

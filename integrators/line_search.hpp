@@ -14,17 +14,18 @@ namespace taut {
 /// What a line search did.
 struct Step {
   double aimed = 0;          ///< the length tried first, but for bounds
-  double length = 0;         ///< alpha; x has moved by alpha p
+  double length = 0;         ///< alpha; x has moved by alpha p. Negative where p leads uphill
   double energy_change = 0;  ///< kg m^2; predicted by the quadratic model unless `evaluated`
   bool evaluated = false;    ///< the gradient where the step ends is known
-  /// The longest length allowed; infinity if that is known to be more than was asked for.
+  /// The longest |alpha| allowed; infinity if that is known to be more than was asked for.
   double bound = std::numeric_limits<double>::infinity();
   bool cut = false;    ///< the bound made the step shorter
   bool found = true;   ///< false: no step was good enough, x is where it was
   int backtracks = 0;  ///< steps tried and refused
 };
 
-/// The half line from + alpha p, as line searches see it. `slope` is g'p at its beginning.
+/// The line from + alpha p, as line searches see it. `slope` is g'p at its beginning: negative, but
+/// where nothing keeps a method from an uphill p (Safeguard off); the way down is alpha < 0 then.
 template <class E>
 class Line {
 public:
@@ -53,20 +54,30 @@ public:
   double known_curvature() const { return form_; }
   /// The step of the quadratic model, -g'p / p'Hp; infinity where no curvature is left along p.
   double newton_length() {
-    return curvature() > 0 ? -slope_ / curvature() : std::numeric_limits<double>::infinity();
+    if (curvature() > 0) return -slope_ / curvature();
+    double const infinity = std::numeric_limits<double>::infinity();
+    return slope_ > 0 ? -infinity : infinity;
   }
   /// max_i |p_i|
   double largest_norm() const {
     return maximum<S>("largest_norm", objective_.size(), 0.0,
-                      kernels::LargestNorm<P, S>{fields_.direction});
+                      kernels::LargestNorm<Vectors>{fields_.direction});
   }
   /// `lengths` in metres where there is no inertia, otherwise infinity.
   double reach(double lengths) const {
     Scale const scale = objective_.scale();
     return scale.has_inertia ? std::numeric_limits<double>::infinity() : lengths * scale.length;
   }
-  /// Largest step up to `at_most` that is valid; to be asked for before the first move.
-  double max_length(double at_most) { return objective_.max_step(x_, fields_.direction, at_most); }
+  /// Largest step along p, or -p if `backwards`, up to `at_most` that is valid; to be asked for
+  /// before the first move.
+  double max_length(double at_most, bool backwards) {
+    if (!backwards) return objective_.max_step(x_, fields_.direction, at_most);
+    kernels::Reverse<P, S> const reverse{fields_.direction};
+    for_each<S>("reverse", objective_.size(), reverse);
+    double const length = objective_.max_step(x_, fields_.direction, at_most);
+    for_each<S>("reverse", objective_.size(), reverse);
+    return length;
+  }
 
   /// x = from + alpha p
   void move(double alpha) {
@@ -131,15 +142,16 @@ struct StepBound {
   template <class E>
   Step first_step(Line<E>& line, double first, double stretch = 1) const {
     Step step{.aimed = first > 0 ? first : line.newton_length()};
+    double const aimed = std::abs(step.aimed);
     double const displacement = std::min(max_displacement, line.reach(reach));
     if (std::isfinite(displacement)) step.bound = displacement / line.largest_norm();
     if (std::isfinite(fraction)) {
-      double const wanted = std::min(stretch * step.aimed, step.bound) / fraction;
-      double const valid = line.max_length(wanted);
+      double const wanted = std::min(stretch * aimed, step.bound) / fraction;
+      double const valid = line.max_length(wanted, step.aimed < 0);
       if (valid < wanted) step.bound = fraction * valid;
     }
-    step.cut = step.aimed > step.bound;
-    step.length = std::min(step.aimed, step.bound);
+    step.cut = aimed > step.bound;
+    step.length = std::copysign(std::min(aimed, step.bound), step.aimed);
     step.found = step.length != 0;
     return step;
   }
@@ -223,30 +235,34 @@ public:
     Step step = params_.bound.first_step(line, first, std::numeric_limits<double>::infinity());
     if (!step.found) return step;
     step.evaluated = true;
-    double low = 0, low_slope = line.slope(), high = 0, high_slope = 0, bound = step.bound;
+    // Lengths and slopes along the half line that leads down.
+    double const sign = step.length < 0 ? -1 : 1;
+    double length = std::abs(step.length), bound = step.bound;
+    double low = 0, low_slope = sign * line.slope(), high = 0, high_slope = 0;
     int side = 0;
     for (int k = 0; k < params_.max_evaluations; ++k) {
-      line.move(step.length);
+      line.move(sign * length);
       step.energy_change = line.evaluate();
-      double const slope = line.slope_here();
-      step.cut = step.length >= bound && slope < 0;
-      if (step.cut || std::abs(slope) <= params_.tolerance * -line.slope()) break;
+      double const slope = sign * line.slope_here();
+      step.cut = length >= bound && slope < 0;
+      if (step.cut || std::abs(slope) <= params_.tolerance * std::abs(line.slope())) break;
       if (slope < 0) {
-        low = step.length;
+        low = length;
         low_slope = slope;
         if (side < 0) high_slope /= 2;
         side = -1;
       } else {
-        high = step.length;
+        high = length;
         high_slope = std::isfinite(slope) ? slope : -low_slope;
         if (side > 0) low_slope /= 2;
         side = 1;
       }
       double const next = high > 0 ? low - low_slope * (high - low) / (high_slope - low_slope)
-                                   : std::min(2 * step.length, bound);
+                                   : std::min(2 * length, bound);
       if (next == low || next == high) break;
-      step.length = next;
+      length = next;
     }
+    step.length = sign * length;
     step.found = step.energy_change <= line.round_off();
     if (!step.found) line.retreat();
     return step;

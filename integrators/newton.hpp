@@ -144,7 +144,7 @@ public:
     if (!started_) linear_.start(e);
     started_ = true;
     // There is no past in a Newton direction, so nothing else could be tried where it fails.
-    Heading heading{.first_length = 1, .steepest = true};
+    Heading heading{.first_length = 1, .steepest = true, .solved = true};
     auto const& p = fields.direction;
     using RightHandSide = kernels::NewtonRightHandSide<P, S>;
     heading.gradient = reducer_.template sum<1>("newton_rhs", e.size(),
@@ -156,12 +156,14 @@ public:
     auto sums = products(fields);
     if (linear.stop == LinearStop::failed || sums[Products::slope] > 0) {
       ++linear_failures_;
+      heading.solved = false;
       preconditioner.apply(b_, p);
       sums = products(fields);
     }
     heading.slope = sums[Products::slope];
     heading.metric = sums[Products::metric];
-    heading.descent = -heading.slope;
+    heading.descent = std::abs(heading.slope);
+    heading.shortened = !heading.solved || linear.residual > std::max(tolerance, unsolved);
     return heading;
   }
 
@@ -170,6 +172,8 @@ public:
 
 private:
   using Products = kernels::NewtonProducts<P, S>;
+  /// Relative residual of a solve whose decrement says too little about what remains.
+  static constexpr double unsolved = 0.2;
 
   Sums<double, Products::count> products(DescentFields<P, S> const& fields) const {
     return reducer_.template sum<Products::count>(
@@ -183,6 +187,9 @@ private:
   bool started_ = false;
   int linear_iterations_ = 0, linear_failures_ = 0;
 };
+
+/// Steps that a line search may refuse along a Newton direction.
+inline constexpr int newton_backtracks = 30;
 
 /// For example Newton<AssembledPcg, BlockJacobi>.
 template <template <class...> class LinearSolver_ = AssembledPcg,
@@ -223,8 +230,9 @@ public:
         "taut: a minimiser and its objective must have the same Precision and Space");
     static_assert(LinearSolver<Linear, E, Preconditioner>,
                   "taut: Newton's first argument must satisfy LinearSolver (linear_solver.hpp)");
-    if (fields_.size() != e.size()) {
-      fields_.resize(e.size());
+    fields_.resize(e.size(), !e.scale().has_inertia);
+    if (preconditioned_ != e.size()) {
+      preconditioned_ = e.size();
       preconditioner_.resize(e.size());
       directions_.resize(e.size());
     }
@@ -242,7 +250,7 @@ private:
   /// A Newton step is worth far more than the evaluations that it takes to shorten it.
   static typename LineSearch_::Params many_backtracks() {
     typename LineSearch_::Params params;
-    if constexpr (requires { params.max_backtracks; }) params.max_backtracks = 30;
+    if constexpr (requires { params.max_backtracks; }) params.max_backtracks = newton_backtracks;
     return params;
   }
   /// What the next steps gain is far less than what the last one did: no need to wait for more.
@@ -254,6 +262,7 @@ private:
 
   Params params_;
   DescentFields<Precision, Space> fields_;
+  int preconditioned_ = -1;  ///< unknowns that there is memory for
   NewtonDirections<Linear, Precision, Space> directions_;
   Preconditioner preconditioner_;
   LineSearch_ line_search_;

@@ -57,12 +57,16 @@ struct MinimiserReport {
   Stop stop = Stop::none;
   int iterations = 0;
   Restarts restarts;
+  int skipped_pairs = 0;     ///< steps that L-BFGS could not learn from (s'y too small)
   int backtracks = 0;        ///< steps tried and refused
   int cuts = 0;              ///< steps cut by a bound
   int refreshes = 0;         ///< updates of the preconditioner
   double energy_change = 0;  ///< sum over the steps, kg m^2; predicted where nothing measured it
   double error_estimate_m = std::numeric_limits<double>::infinity();    ///< mass-weighted rms, m
   double error_estimate_mps = std::numeric_limits<double>::infinity();  ///< the same over h, m/s
+  /// What round-off in the gradient makes of the error whatever the number of iterations, m; the
+  /// estimates are never below it. An order of magnitude (Descent::error_floor).
+  double error_floor_m = 0;
   double gradient_norm = 0;  ///< |M^-1 g|, mass-weighted rms at the start of the last step, m
   double seconds = 0;
 

@@ -1,9 +1,19 @@
 // When to stop. All rules keep the error estimate that a report shows:
 //   |x - x*|_rms <= sqrt(2 (sum of the last energy decrements) / (lambda M)),
-// in which M is the mass and lambda a lower bound of the curvature relative to it: 1 with inertia;
-// without, the smallest p'Hp / p'Mp that was seen. It sees rigid motion and means the same for
-// every stiffness (measured: within a factor of 0.7 to 1.6 of the true error for windows of 8
-// steps).
+// in which M is the mass and lambda the curvature, relative to it, along what is left to go.
+//
+// With inertia lambda = 1, a lower bound. Without, the smallest value counts of all p'Hp / p'Mp so
+// far and of 2 (energy lost) / |x - x0|^2_M, which is the one along all that has been covered:
+// loads are smooth, so it ends near the lowest modes, where single directions of a solver that has
+// only begun are far too stiff.
+//
+// The sum stands for what is still to come only if the decrements fall: the window is as long as it
+// takes for its second half to gain less than half of what the first one did, and until then
+// nothing has converged. Measured with a window of 8 on bars of 1e4 to 1e9 Pa, under implicit Euler
+// and at rest (cantilevers of L/t = 10 and 40, a hanging bar, Cook's membrane; CG and L-BFGS, block
+// Jacobi and Schwarz): the true error is below 1.7 times the estimate. A start that is rough on the
+// scale of elements hides slow modes from it where there is no inertia: what smoothing gains falls
+// fast.
 #pragma once
 
 #include <taut/core/potential/objective.hpp>
@@ -20,9 +30,12 @@ namespace taut {
 /// What is known after a step.
 struct Progress {
   double decrement = 0;      ///< energy lost in the step (predicted where nothing measured it)
-  double attainable = 0;     ///< the same, had no bound cut the step
-  double curvature = 0;      ///< p'Hp / p'Mp; only needed without inertia
+  double attainable = 0;     ///< the same, had nothing cut or shortened the step
+  double curvature = 1;      ///< lambda, 0 if unknown; rules ask for it without inertia only
   double gradient_norm = 0;  ///< |M^-1 g|, mass-weighted rms before the step, m
+  double floor = 0;          ///< what round-off makes of the error, m (MinimiserReport)
+  /// The step is no measure of what is left: it cannot end a minimisation.
+  bool shortened = false;
   /// No further step is possible; `attainable` stands for all that were to come.
   bool stuck = false;
 };
@@ -42,60 +55,103 @@ concept Stopping = requires(R& rule, R const& c, Scale const& scale, Progress co
 /// The sum over the last steps, and the error that it predicts.
 class ErrorEstimate {
 public:
-  explicit ErrorEstimate(int window = 8) : decrements_(std::size_t(std::max(window, 1))) {}
+  /// At least so many steps are summed, and at most `longest`.
+  explicit ErrorEstimate(int window = 8)
+      : least_(std::size_t(std::max(window, 1))), decrements_(std::max(least_, longest)) {}
 
   void start(Scale const& scale) {
     scale_ = scale;
-    curvature_ = scale.has_inertia ? 1 : std::numeric_limits<double>::infinity();
+    curvature_ = 1;
+    floor_ = 0;
     forget();
   }
-  void forget() { count_ = 0; }
+  void forget() {
+    count_ = 0;
+    window_ = least_;
+    conclusive_ = false;
+  }
   void add(Progress const& progress) {
-    if (!scale_.has_inertia && progress.curvature > 0)
-      curvature_ = std::min(curvature_, progress.curvature);
+    if (!scale_.has_inertia) curvature_ = progress.curvature;
+    floor_ = progress.floor;
     double const attainable = std::abs(progress.attainable);
     if (progress.stuck) {
-      std::fill(decrements_.begin(), decrements_.end(), attainable);
-      count_ = decrements_.size();
+      window_ = least_;
+      std::fill_n(decrements_.begin(), window_, attainable);
+      count_ = window_;
+      conclusive_ = true;
     } else {
       decrements_[count_++ % decrements_.size()] = attainable;
+      adapt();
+      conclusive_ = conclusive_ && !progress.shortened;
     }
   }
-  bool full() const { return count_ >= decrements_.size(); }
+  /// The window is full and falls, and the last step was one to judge by.
+  bool conclusive() const { return conclusive_; }
+  /// Steps that are summed now.
+  int window() const { return static_cast<int>(window_); }
 
   /// In metres; infinity before the first step. A window that is not full is extrapolated.
-  double error_estimate() const {
-    if (count_ == 0) return std::numeric_limits<double>::infinity();
-    std::size_t const known = std::min(count_, decrements_.size());
-    double sum = 0;
-    for (std::size_t k = 0; k < known; ++k) sum += decrements_[k];
-    sum *= double(decrements_.size()) / double(known);
-    return std::sqrt(2 * sum / (curvature_ * scale_.mass));
-  }
+  double error_estimate() const { return std::max(unfloored_estimate(), floor_); }
 
 protected:
+  double unfloored_estimate() const {
+    if (count_ == 0) return std::numeric_limits<double>::infinity();
+    std::size_t const known = std::min(count_, window_);
+    double const lost = sum(0, known) * double(window_) / double(known);
+    return lost == 0 ? 0 : std::sqrt(2 * lost / (curvature_ * scale_.mass));
+  }
+
   Scale scale_;
+  double floor_ = 0;
 
 private:
-  std::vector<double> decrements_;
+  static constexpr std::size_t longest = 1024;
+  /// A window whose second half gains less than 1/16 of what the first did is longer than needed.
+  static constexpr double much_less = 1. / 16;
+
+  /// Steps from the last but `begin` back to the last but `end`.
+  double sum(std::size_t begin, std::size_t end) const {
+    double total = 0;
+    for (std::size_t k = begin; k < end; ++k) {
+      total += decrements_[(count_ - 1 - k) % decrements_.size()];
+    }
+    return total;
+  }
+  void adapt() {
+    conclusive_ = count_ >= window_;
+    if (!conclusive_ || window_ == 1) return;
+    double const late = sum(0, window_ / 2), early = sum(window_ / 2, window_);
+    conclusive_ = late <= 0.5 * early;
+    if (!conclusive_) {
+      window_ = std::min(2 * window_, decrements_.size());
+    } else if (late <= much_less * early) {
+      window_ = std::max(window_ / 2, least_);
+    }
+  }
+
+  std::size_t least_, window_ = least_;
+  std::vector<double> decrements_;  ///< a ring
   std::size_t count_ = 0;
+  bool conclusive_ = false;
   double curvature_ = 1;
 };
 
-/// Stops when the estimated error is below `tolerance` lengths.
+/// Stops when the estimated error is below `tolerance` lengths. Where round-off forbids that, it
+/// stops as stalled once further steps gain less than round-off costs.
 class DecrementWindow : public ErrorEstimate {
 public:
   struct Params {
     double tolerance = 1e-3;  ///< of Scale::length; 0 switches the rule off
-    int window = 8;           ///< steps; 32 where the stiffness is extreme for the preconditioner
+    int window = 8;           ///< steps at least
   };
   DecrementWindow() : DecrementWindow(Params()) {}
   explicit DecrementWindow(Params const& params) : ErrorEstimate(params.window), params_(params) {}
 
   Stop check(Progress const& progress) {
     add(progress);
-    bool const reached = full() && error_estimate() < params_.tolerance * scale_.length;
-    return reached ? Stop::converged_by_decrement : Stop::none;
+    if (!conclusive() || params_.tolerance == 0) return Stop::none;
+    if (error_estimate() < params_.tolerance * scale_.length) return Stop::converged_by_decrement;
+    return unfloored_estimate() < 0.25 * floor_ ? Stop::stalled : Stop::none;
   }
 
 private:

@@ -2,9 +2,12 @@
 //   E(x) = 1/2 |x - x~|^2_M + c h^2 V(x),
 // where the rule says x~, c and the new velocity:
 //
-//   implicit Euler  x~ = x + h v                                 c = 1    v+ = (x+ - x) / h
-//   BDF2            x~ = (4 x - x-)/3 + 2h/9 (4 v - v-)          c = 4/9  v+ = (3 x+ - 4 x + x-) /
-//   2h quasi-static    no inertia                                   c = 1    v+ = 0
+//   implicit Euler  x~ = x + h v                             c = 1    v+ = (x+ - x) / h
+//   BDF2            x~ = a x - b x- + d h (a v - b v-)       c = d^2  v+ = (x+ - a x + b x-) / (d
+//   h) quasi-static    no inertia                               c = 1    v+ = 0
+//
+// With r the ratio of this step to the last one, BDF2 has a = (1 + r)^2 / (1 + 2r), b = r^2 / (1 +
+// 2r) and d = (1 + r) / (1 + 2r): 4/3, 1/3 and 2/3 while h does not change.
 //
 // Body forces are part of V. The minimisation starts from the predictor, the minimum of all terms
 // but the swept ones (x + h v + h^2 g for implicit Euler); vertices and pins go there together, as
@@ -30,6 +33,7 @@ struct State {
   Positions x, v;            ///< m, m/s
   Positions x_last, v_last;  ///< at the step before (multistep rules)
   double time = 0;           ///< s
+  double last_step = 0;      ///< length of the step before, s; 0: there was none
   int steps = 0;             ///< taken so far
 
   State() = default;
@@ -41,28 +45,37 @@ struct State {
   int size() const { return static_cast<int>(x.extent(0)); }
 };
 
+/// x~ = a0 x + a1 x- + h (b0 v + b1 v-);  v+ = (c x+ + c0 x + c1 x-) / h;  scale h^2.
+struct StepCoefficients {
+  double a0, a1, b0, b1, c, c0, c1, scale;
+};
+
+/// A rule: `coefficients` for a step that is `ratio` times as long as the last one.
 struct ImplicitEulerRule {
   static constexpr char const* name = "implicit_euler";
   static constexpr bool inertia = true;
   static constexpr bool multistep = false;
-  /// x~ = a0 x + a1 x- + h (b0 v + b1 v-);  v+ = (c x+ + c0 x + c1 x-) / h;  scale h^2.
-  static constexpr double a0 = 1, a1 = 0, b0 = 1, b1 = 0, c = 1, c0 = -1, c1 = 0, scale = 1;
+  static constexpr StepCoefficients coefficients(double) { return {1, 0, 1, 0, 1, -1, 0, 1}; }
 };
 
-/// Second order; its first step is one of implicit Euler.
+/// Second order; its first step is one of implicit Euler. Steps may shrink at will; growing by more
+/// than 1 + sqrt(2) time and again is unstable (Grigorieff 1983).
 struct Bdf2Rule {
   static constexpr char const* name = "bdf2";
   static constexpr bool inertia = true;
   static constexpr bool multistep = true;
-  static constexpr double a0 = 4. / 3, a1 = -1. / 3, b0 = 8. / 9, b1 = -2. / 9, c = 1.5, c0 = -2,
-                          c1 = 0.5, scale = 4. / 9;
+  static constexpr StepCoefficients coefficients(double ratio) {
+    double const unit = 1 + 2 * ratio, d = (1 + ratio) / unit;
+    double const a = (1 + ratio) * (1 + ratio) / unit, b = ratio * ratio / unit;
+    return {a, -b, d * a, -d * b, 1 / d, -a / d, b / d, d * d};
+  }
 };
 
 struct QuasiStaticRule {
   static constexpr char const* name = "quasi_static";
   static constexpr bool inertia = false;
   static constexpr bool multistep = false;
-  static constexpr double a0 = 1, a1 = 0, b0 = 0, b1 = 0, c = 0, c0 = 0, c1 = 0, scale = 1;
+  static constexpr StepCoefficients coefficients(double) { return {1, 0, 0, 0, 0, 0, 0, 1}; }
 };
 
 namespace kernels {
@@ -149,43 +162,47 @@ public:
   TimeStepper() = default;
   explicit TimeStepper(Params const& params) : minimiser_(params) {}
 
-  /// Advances the state by h seconds. Pins go to potential.unknowns().prescribed, which the caller
-  /// has set for the end of the step. The state is left as it was if the step throws.
+  /// Advances the state by h seconds and returns the minimiser's report. Pins go to
+  /// potential.unknowns().prescribed, which the caller has set for the end of the step. The state
+  /// is left as it was if the step throws or ends in Stop::non_finite.
   template <class Potential>
-  MinimiserReport step(Potential& potential, State<Precision, Space>& state, double h,
-                       Observer<Precision, Space> const& observer = {}) {
-    if (Rule::multistep && state.steps == 0) {
+  auto step(Potential& potential, State<Precision, Space>& state, double h,
+            Observer<Precision, Space> const& observer = {}) {
+    if (Rule::multistep && state.last_step == 0) {
       return advance<ImplicitEulerRule>(potential, state, h, observer);
     }
     return advance<Rule>(potential, state, h, observer);
   }
 
   Minimiser& minimiser() { return minimiser_; }
+  /// Where the last minimisation ended, m: what the state is now, unless the step was refused.
+  Positions const& reached() const { return x_; }
 
 private:
   template <class R, class Potential>
-  MinimiserReport advance(Potential& potential, State<Precision, Space>& state, double h,
-                          Observer<Precision, Space> const& observer) {
+  auto advance(Potential& potential, State<Precision, Space>& state, double h,
+               Observer<Precision, Space> const& observer) {
     int const n = state.size();
+    StepCoefficients const r = R::coefficients(R::multistep ? h / state.last_step : 1);
     if (static_cast<int>(x_.extent(0)) != n) {
       x_ = Positions("step_x", n);
       direction_ = VectorField<typename Precision::real, Space>("step_direction", n);
     }
-    potential.begin_step(R::scale * (R::inertia ? h * h : 1.0), h * std::sqrt(R::scale),
-                         R::inertia);
+    potential.begin_step(r.scale * (R::inertia ? h * h : 1.0), h * std::sqrt(r.scale), R::inertia);
     auto& inertia = potential.template term<Inertia<Precision, Space>>();
     inertia.switch_on(R::inertia);
     for_each<Space>("inertial_target", n,
-                    kernels::InertialTarget<Precision, Space>{state, inertia.target(), x_, R::a0,
-                                                              R::a1, h * R::b0, h * R::b1});
+                    kernels::InertialTarget<Precision, Space>{state, inertia.target(), x_, r.a0,
+                                                              r.a1, h * r.b0, h * r.b1});
     potential.predict(x_);
     start(potential, state);
-    MinimiserReport const report = minimiser_.minimise(potential, x_, observer);
-    for_each<Space>(
-        "finish_step", n,
-        kernels::FinishStep<Precision, Space>{state, x_, R::c / h, R::c0 / h, R::c1 / h});
+    auto const report = minimiser_.minimise(potential, x_, observer);
+    if (report.stop == Stop::non_finite) return report;
+    for_each<Space>("finish_step", n,
+                    kernels::FinishStep<Precision, Space>{state, x_, r.c / h, r.c0 / h, r.c1 / h});
     Kokkos::fence("taut: step");
     state.time += h;
+    state.last_step = h;
     ++state.steps;
     return report;
   }

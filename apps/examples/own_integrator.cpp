@@ -25,6 +25,7 @@ public:
     axpy(state.v, 4 / h, y, -4 / h, state.x, -1, state.v);
     axpy(state.x, 2, y, -1, state.x);
     state.time += h;
+    state.last_step = h;
     ++state.steps;
     return report;
   }

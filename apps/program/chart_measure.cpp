@@ -23,10 +23,10 @@ double largest_distance(std::vector<Point> const& x, std::vector<Point> const& y
 }
 
 double energy_scale(Scene const& scene, int step) {
+  if (scene.scheme == TimeScheme::quasi_static) return 1;
   double const h2 = scene.step * scene.step;
-  if (scene.scheme == TimeScheme::quasi_static) return QuasiStaticRule::scale;
   bool const bdf2 = scene.scheme == TimeScheme::bdf2 && step > 1;
-  return h2 * (bdf2 ? Bdf2Rule::scale : ImplicitEulerRule::scale);
+  return bdf2 ? h2 * Bdf2Rule::coefficients(1).scale : h2;
 }
 
 }  // namespace

@@ -41,11 +41,8 @@ public:
 
   NewtonReport minimise(ProgramPotential<P>& potential, Positions const& x,
                         Observer<P, Space> const& observer) {
-    last_ = minimiser_->minimise(potential, x, observer);
-    return last_;
+    return minimiser_->minimise(potential, x, observer);
   }
-  /// What the last call returned, with the counts of the linear solver.
-  NewtonReport const& last() const { return last_; }
 
   struct Interface {
     virtual ~Interface() = default;
@@ -55,7 +52,6 @@ public:
 
 private:
   std::unique_ptr<Interface> minimiser_;
-  NewtonReport last_;
 };
 
 extern template class AnyMinimiser<Fp64>;

@@ -65,7 +65,7 @@ private:
   std::unique_ptr<Interface> hold(typename Minimiser::Params params) const {
     params.preconditioner = preconditioner();
     params.line_search = line_search();
-    params.stop = stopping(options_.integer("window"));
+    params.stop = stopping(window(8));
     params.budget.max_iterations = options_.integer("max_iterations");
     params.safeguard.on = options_.flag("safeguard");
     return std::make_unique<Holder<Minimiser>>(params);
@@ -73,21 +73,31 @@ private:
 
   template <template <class, class> class Linear>
   std::unique_ptr<Interface> newton() const {
-    using Minimiser = Newton<Linear, AnyPreconditioner, SufficientDecrease, AnyStopping, P, Space>;
+    using Minimiser = Newton<Linear, AnyPreconditioner, AnyLineSearch, AnyStopping, P, Space>;
     typename Minimiser::Params params;
+    params.line_search = line_search();
+    if (auto* armijo = std::get_if<SufficientDecrease::Params>(&params.line_search)) {
+      armijo->max_backtracks = newton_backtracks;
+    }
     params.preconditioner = preconditioner();
     if constexpr (requires { params.linear.max_iterations; }) {
       params.linear.max_iterations = options_.integer("max_linear_iterations");
     }
     params.forcing.largest = options_.number("linear_tolerance");
-    params.stop = stopping(1);
+    params.stop = stopping(window(1));
     params.budget.max_iterations = options_.integer("max_iterations");
     params.safeguard.on = options_.flag("safeguard");
     return std::make_unique<Holder<Minimiser>>(params);
   }
 
-  Refresh refresh() const {
-    std::string const& when = options_.text("refresh");
+  int window(int of_method) const {
+    int const chosen = options_.integer("window");
+    return chosen > 0 ? chosen : of_method;
+  }
+
+  Refresh refresh(std::string_view of_preconditioner) const {
+    std::string_view when = options_.text("refresh");
+    if (when == "auto") when = of_preconditioner;
     if (when == "lagged") return Refresh::lagged(options_.integer("refresh_every"));
     if (when == "rare") {
       return {.interval = options_.integer("refresh_every"), .trigger = Refresh::rarely().trigger};
@@ -98,11 +108,12 @@ private:
   typename Preconditioner::Params preconditioner() const {
     std::string const& name = options_.text("preconditioner");
     if (name == "identity") return typename Identity<P, Space>::Params{};
-    if (name == "jacobi") return typename Jacobi<P, Space>::Params{.refresh = refresh()};
-    if (name == "block_jacobi") return typename BlockJacobi<P, Space>::Params{.refresh = refresh()};
+    if (name == "jacobi") return typename Jacobi<P, Space>::Params{.refresh = refresh("always")};
+    if (name == "block_jacobi") {
+      return typename BlockJacobi<P, Space>::Params{.refresh = refresh("always")};
+    }
     typename Schwarz<P, Space>::Params schwarz;
-    schwarz.refresh = {.interval = options_.integer("refresh_every"),
-                       .trigger = Refresh::rarely().trigger};
+    schwarz.refresh = refresh("rare");
     schwarz.aggregate = name == "schwarz_16" ? 16 : 32;
     return schwarz;
   }
@@ -118,7 +129,7 @@ private:
     std::string const& name = options_.text("stopping");
     double const tolerance = options_.number("tolerance");
     if (name == "energy_drop") return EnergyDrop::Params{.tolerance = tolerance};
-    if (name == "gradient_norm") return GradientNorm::Params{.tolerance = tolerance};
+    if (name == "gradient_norm") return GradientNorm::Params{tolerance, true};
     return DecrementWindow::Params{.tolerance = name == "budget" ? 0 : tolerance, .window = window};
   }
 

@@ -1,4 +1,5 @@
 #include <taut/apps/program/scene_options.hpp>
+#include <taut/integrators/lbfgs.hpp>
 
 namespace taut {
 
@@ -21,12 +22,16 @@ std::span<SolverKey const> solver_keys() {
        {"identity", "jacobi", "block_jacobi", "schwarz_16", "schwarz_32"},
        "schwarz: dense aggregates of 16 or 32 vertices with a coarse level"},
       {"refresh",
-       std::string("always"),
+       std::string("auto"),
        {},
-       {"always", "lagged", "rare"},
-       "when the preconditioner is rebuilt: each iteration, from the last one, every "
-       "refresh_every"},
-      {"refresh_every", 30, {.min = 1, .max = 1e6}, {}, "iterations between rare refreshes"},
+       {"auto", "always", "lagged", "rare"},
+       "when the preconditioner is rebuilt: at each iterate; every refresh_every; the same and "
+       "where the steps collapse; auto: rare for schwarz, always for the others"},
+      {"refresh_every",
+       30,
+       {.min = 1, .max = 1e6},
+       {},
+       "iterations between refreshes that are lagged or rare"},
       {"curvature",
        std::string("clamp"),
        {},
@@ -45,14 +50,18 @@ std::span<SolverKey const> solver_keys() {
        "drop "
        "relative to the first; gradient norm relative to the first; max_iterations alone"},
       {"tolerance", 1e-3, {.min = 0, .max = 1, .open_min = true}, {}, "of the stopping rule"},
-      {"window", 8, {.min = 1, .max = 1000}, {}, "decrements summed by decrement_window"},
+      {"window",
+       0,
+       {.min = 0, .max = 1000},
+       {},
+       "decrements summed at least by decrement_window; 0: 8, or 1 for newton"},
       {"max_iterations", 2000, {.min = 1, .max = 1e9}, {}, "budget of a time step"},
-      {"history", 8, {.min = 1, .max = 100}, {}, "pairs kept by lbfgs"},
+      {"history", 8, {.min = 1, .max = max_lbfgs_window}, {}, "pairs kept by lbfgs"},
       {"chebyshev_rho",
        0.99,
-       {.min = 0, .max = 1, .open_min = true, .open_max = true},
+       {.min = 0, .max = 1, .open_max = true},
        {},
-       "spectral radius that chebyshev assumes"},
+       "spectral radius that chebyshev assumes; 0: measured"},
       {"hessian",
        std::string("assembled"),
        {},

@@ -65,11 +65,9 @@ public:
         observer({i.index, i.energy_change_so_far, i.error_estimate, [&] { return read(i.x); }});
       };
     }
-    State<P> const before = copy(state_);
     NewtonReport const report = advance(h, inner);
     if (report.stop == Stop::non_finite) {
-      auto const inverted = inverted_tets(geometry_.mesh, read(state_.x));
-      state_ = before;
+      auto const inverted = inverted_tets(geometry_.mesh, read(reached_));
       throw Error(
           "step {} at {:.6g} s: the energy is not a number any more ({}); use a smaller time.step, "
           "or "
@@ -89,11 +87,13 @@ public:
 
   void save(Checkpoint& checkpoint) const override {
     checkpoint.set("time", std::vector<double>{state_.time});
+    checkpoint.set("last_step", std::vector<double>{state_.last_step});
     checkpoint.set("steps", std::vector<std::int32_t>{state_.steps});
     for (auto const& [name, field] : fields()) checkpoint.set(name, flat(field));
   }
   void restore(Checkpoint const& checkpoint) override {
     state_.time = checkpoint.number<double>("time");
+    state_.last_step = checkpoint.number<double>("last_step");
     state_.steps = checkpoint.number<std::int32_t>("steps");
     for (auto const& [name, field] : fields()) {
       auto const& numbers = checkpoint.get<Position>(name);
@@ -212,8 +212,9 @@ private:
 
   NewtonReport advance(double h, Observer<P, DefaultSpace> const& observer) {
     auto const run = [&](auto& stepper) {
-      stepper.step(potential_, state_, h, observer);
-      return stepper.minimiser().last();
+      NewtonReport const report = stepper.step(potential_, state_, h, observer);
+      reached_ = stepper.reached();
+      return report;
     };
     switch (scene_.scheme) {
       case TimeScheme::bdf2:
@@ -249,23 +250,13 @@ private:
   std::vector<std::pair<std::string, Positions>> fields() const {
     return {{"x", state_.x}, {"v", state_.v}, {"x_last", state_.x_last}, {"v_last", state_.v_last}};
   }
-  static State<P> copy(State<P> const& from) {
-    State<P> to(from.size());
-    Kokkos::deep_copy(to.x, from.x);
-    Kokkos::deep_copy(to.v, from.v);
-    Kokkos::deep_copy(to.x_last, from.x_last);
-    Kokkos::deep_copy(to.v_last, from.v_last);
-    to.time = from.time;
-    to.steps = from.steps;
-    return to;
-  }
-
   Scene scene_;
   SceneGeometry geometry_;
   Ordering order_;
   std::vector<double> lumped_;  ///< in the mesh's order
   ProgramPotential<P> potential_;
   State<P> state_;
+  Positions reached_;  ///< by the last minimisation, also where the step was then refused
   Vectors forces_;
   typename FixedMask<DefaultSpace>::HostMirror fixed_;
   typename Positions::HostMirror prescribed_;

@@ -126,10 +126,7 @@ public:
     return step_to_inversion(x, p, at_most, !Material::allows_inversion);
   }
 
-  int elements(std::vector<int>& vertices) const {
-    vertices.insert(vertices.end(), vertices_.begin(), vertices_.end());
-    return 4;
-  }
+  void elements(std::vector<Connectivity>& kinds) const { kinds.push_back({vertices_, 4}); }
 
 private:
   using Sum = typename Precision::sum;

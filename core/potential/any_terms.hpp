@@ -69,11 +69,8 @@ public:
     for (auto const& t : terms_) at_most = t->max_prescribed_step(x, p, at_most);
     return at_most;
   }
-  /// All terms must have elements of equal length.
-  int elements(std::vector<int>& vertices) const {
-    int length = 1;
-    for (auto const& t : terms_) length = t->elements(vertices);
-    return length;
+  void elements(std::vector<Connectivity>& kinds) const {
+    for (auto const& t : terms_) t->elements(kinds);
   }
 
 private:
@@ -98,7 +95,7 @@ private:
     virtual void add_to(Matrix const&, Positions const&, double, Fixed const&) const = 0;
     virtual double max_step(Positions const&, Vectors const&, double) const = 0;
     virtual double max_prescribed_step(Positions const&, Vectors const&, double) const = 0;
-    virtual int elements(std::vector<int>&) const = 0;
+    virtual void elements(std::vector<Connectivity>&) const = 0;
   };
 
   template <class Term>
@@ -150,7 +147,7 @@ private:
                                double at_most) const override {
       return term.max_prescribed_step(x, p, at_most);
     }
-    int elements(std::vector<int>& v) const override { return term.elements(v); }
+    void elements(std::vector<Connectivity>& kinds) const override { term.elements(kinds); }
   };
 
   template <class Part>

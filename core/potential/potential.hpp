@@ -326,14 +326,8 @@ public:
   }
 
   Matrix pattern() const {
-    std::vector<std::vector<int>> lists;
-    std::vector<int> lengths;
-    for_each_swept([&](auto const& term) {
-      lists.emplace_back();
-      lengths.push_back(term.elements(lists.back()));
-    });
     std::vector<Connectivity> kinds;
-    for (std::size_t k = 0; k < lists.size(); ++k) kinds.push_back({lists[k], lengths[k]});
+    for_each_swept([&](auto const& term) { term.elements(kinds); });
     return Matrix(pattern_from_elements(size(), kinds));
   }
 

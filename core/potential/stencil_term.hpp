@@ -109,7 +109,11 @@ struct StencilRows : StencilData<Kernel, S, Precision> {
         sum = sum + this->kernel.gradient(e, y, a);
       }
       if constexpr (numbers > 0) {
-        Mat3<double> const block = this->kernel.curvature(e, y, a, a);
+        Mat3<double> block = this->kernel.curvature(e, y, a, a);
+        for (int b = 0; b < Base::N; ++b) {  // an element may name an unknown twice
+          bool const again = b != a && this->vertex(Base::N * e + b) == i;
+          if (again) block = block + this->kernel.curvature(e, y, a, b);
+        }
         double const entries[6] = {block(0, 0), block(1, 1), block(2, 2),
                                    block(0, 1), block(1, 2), block(0, 2)};
         for (int c = 0; c < numbers; ++c) h[c] += entries[c];
@@ -213,10 +217,7 @@ public:
   double max_prescribed_step(Positions const&, Vectors const&, double at_most) const {
     return at_most;
   }
-  int elements(std::vector<int>& vertices) const {
-    vertices.insert(vertices.end(), vertices_.begin(), vertices_.end());
-    return N;
-  }
+  void elements(std::vector<Connectivity>& kinds) const { kinds.push_back({vertices_, N}); }
 
 private:
   using Data = kernels::StencilData<Kernel, Space, Precision>;

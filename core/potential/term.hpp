@@ -44,7 +44,7 @@ concept SweptTerm = requires(
     VectorField<typename Term::Precision::real, typename Term::Space> p,
     BlockField<typename Term::Precision::real, typename Term::Space> blocks,
     BlockCsr<typename Term::Space, double> matrix, FixedMask<typename Term::Space> fixed,
-    double alpha, double scale, double at_most, std::vector<int>& vertices) {
+    double alpha, double scale, double at_most, std::vector<Connectivity>& kinds) {
   { term.value(x, scale) } -> std::convertible_to<double>;
   /// E(x + alpha p) - E(x)
   { term.change(x, p, alpha, scale) } -> std::convertible_to<double>;
@@ -62,8 +62,9 @@ concept SweptTerm = requires(
   { term.max_step(x, p, at_most) } -> std::convertible_to<double>;
   /// The same as seen by prescribed motion, which may never fold the mesh (whatever the material).
   { term.max_prescribed_step(x, p, at_most) } -> std::convertible_to<double>;
-  /// Vertex lists of equal length for the sparsity pattern: appends them and returns the length.
-  { term.elements(vertices) } -> std::convertible_to<int>;
+  /// For the sparsity pattern: appends the term's elements, one entry for each number of unknowns
+  /// that they couple. The entries refer to memory of the term.
+  {term.elements(kinds)};
 };
 
 }  // namespace taut

@@ -107,6 +107,39 @@ TEST_CASE("no step leaves more than the asked fraction of what is valid") {
   CHECK(step.energy_change < 0);
 }
 
+TEST_CASE("an uphill direction is followed backwards, within the same bounds") {
+  Setting<toy::Barrier> s(-1);
+  auto const backwards = Setting<toy::Barrier>(1).fields.direction;
+  double const valid = s.chain.max_step(s.x, backwards, toy::infinity);
+  SECTION("newton") {
+    auto line = s.line();
+    REQUIRE(line.newton_length() < -valid);
+    Step const step = NewtonStep()(line, 0);
+    CHECK(step.cut);
+    CHECK(step.length < 0);
+    CHECK(-step.length <= 0.5 * valid);
+    CHECK(std::isfinite(s.chain.value(s.x)));
+    CHECK(s.arrived(step.length));
+  }
+  SECTION("sufficient decrease") {
+    auto line = s.line();
+    Step const step = SufficientDecrease()(line, 0);
+    CHECK(step.found);
+    CHECK(-step.length <= 0.5 * valid);
+    CHECK(step.energy_change < 0);
+  }
+  SECTION("exact") {
+    auto line = s.line();
+    Step const step = ExactLineSearch({.bound = {.fraction = 0.999}})(line, 0);
+    CHECK(step.found);
+    CHECK(step.length < 0);
+    CHECK(-step.length < valid);
+    CHECK((step.cut || std::abs(s.slope_ratio()) < 1e-9));
+  }
+  // The direction itself is what it was.
+  CHECK(s.fields.direction(5, 1) == -backwards(5, 1));
+}
+
 TEST_CASE("sufficient decrease shortens a step that is too long") {
   Setting<toy::Quartic> s;
   auto line = s.line();

@@ -107,7 +107,8 @@ TEST_CASE("nothing to do") {
   auto const report = Method<>().minimise(chain, x);
   CHECK(report.stop == Stop::converged_by_gradient);
   CHECK(report.iterations == 0);
-  CHECK(report.error_estimate_m == 0);
+  CHECK(report.error_estimate_m == report.error_floor_m);
+  CHECK(report.error_floor_m < 1e-15);
   CHECK(values(x) == before);
 }
 

@@ -30,14 +30,20 @@ TEST_CASE("the decrement window stops when the sum of its steps is small") {
   CHECK(rule.check(step(1e-9)) == Stop::none);  // one step is not a window
   CHECK_THAT(rule.error_estimate(), WithinRel(std::sqrt(2 * 4e-9 / 4), 1e-14));
   CHECK(rule.check(step(1)) == Stop::none);
-  for (double const decrement : {1e-3, 1e-3, 1e-3, 3e-3}) {
-    CHECK(rule.check(step(decrement)) == Stop::none);  // the 1, or 6e-3
+  for (double const decrement : {5e-2, 4e-3, 1e-3, 1e-3}) {
+    CHECK(rule.check(step(decrement)) == Stop::none);  // the 1, or 5.6e-2
   }
-  CHECK_THAT(rule.error_estimate(), WithinRel(std::sqrt(2 * 6e-3 / 4), 1e-14));
-  CHECK(rule.check(step(-1e-9)) == Stop::none);
-  CHECK(rule.check(step(1e-9)) == Stop::converged_by_decrement);  // 4e-3 + 2e-9
+  CHECK_THAT(rule.error_estimate(), WithinRel(std::sqrt(2 * 5.6e-2 / 4), 1e-14));
+  CHECK(rule.check(step(-1e-9)) == Stop::none);                   // 6e-3 + 1e-9
+  CHECK(rule.check(step(1e-9)) == Stop::converged_by_decrement);  // 2e-3 + 2e-9
   rule.forget();
   CHECK(rule.check(step(0)) == Stop::none);
+
+  // A step that was shortened cannot end it, however little is left.
+  for (int k = 0; k < 9; ++k) {
+    CHECK(rule.check({.decrement = 0, .attainable = 0, .shortened = true}) == Stop::none);
+  }
+  rule.forget();
 
   // A step that was cut counts with what it could have gained.
   for (int k = 0; k < 9; ++k) CHECK(rule.check({.decrement = 0, .attainable = 1}) == Stop::none);
@@ -46,13 +52,49 @@ TEST_CASE("the decrement window stops when the sum of its steps is small") {
         Stop::converged_by_decrement);
 }
 
-TEST_CASE("without inertia the smallest curvature seen scales the estimate") {
+TEST_CASE("the window grows where decrements do not fall, and shrinks where they fall fast") {
+  DecrementWindow rule({.tolerance = 0.1, .window = 8});
+  rule.start({.mass = 1, .length = 1});
+  // So slow a fall would look converged, 8 e-4 < 5e-3, though 1e4 such steps are to come.
+  for (int k = 0; k < 200; ++k) CHECK(rule.check(step(1e-4 * (1 - 1e-4 * k))) == Stop::none);
+  CHECK(rule.window() == 256);
+  double decrement = 1e-4;
+  // It takes the length of the window to tell.
+  for (int k = 0; k < 400; ++k) rule.check(step(decrement *= 0.7));
+  CHECK(rule.window() == 8);
+
+  // A fall by half in 4 steps of 8 is enough, and nothing is slower for it.
+  rule.start({.mass = 1, .length = 1});
+  decrement = 1;
+  int steps = 0;
+  for (Stop stop = Stop::none; stop == Stop::none; ++steps)
+    stop = rule.check(step(decrement *= 0.8));
+  CHECK(rule.window() == 8);
+  double sum = 0;
+  for (int k = 0; k < 8; ++k) sum += std::pow(0.8, steps - k);
+  CHECK(sum < 5e-3);
+  CHECK(sum / 0.8 > 5e-3);
+}
+
+TEST_CASE("what round-off costs is never promised") {
+  DecrementWindow rule({.tolerance = 1e-3, .window = 1});
+  rule.start({.mass = 2, .length = 1});
+  auto const with = [](double decrement, double floor) {
+    return Progress{.decrement = decrement, .attainable = decrement, .floor = floor};
+  };
+  CHECK(rule.check(with(1e-10, 1e-4)) == Stop::converged_by_decrement);
+  CHECK(rule.error_estimate() == 1e-4);
+  CHECK(rule.check(with(1e-6, 2e-3)) == Stop::none);      // 1e-3, more than noise
+  CHECK(rule.check(with(1e-10, 2e-3)) == Stop::stalled);  // 1e-5
+  CHECK(rule.error_estimate() == 2e-3);
+}
+
+TEST_CASE("without inertia the curvature scales the estimate") {
   DecrementWindow rule({.tolerance = 0.1, .window = 1});
   rule.start({.mass = 4, .length = 0.5, .time_step = 1, .has_inertia = false});
   rule.check({.decrement = 1, .attainable = 1, .curvature = 50});
   CHECK_THAT(rule.error_estimate(), WithinRel(std::sqrt(2.0 / (50 * 4)), 1e-14));
   rule.check({.decrement = 1, .attainable = 1, .curvature = 8});
-  rule.check({.decrement = 1, .attainable = 1, .curvature = 50});
   CHECK_THAT(rule.error_estimate(), WithinRel(std::sqrt(2.0 / (8 * 4)), 1e-14));
 }
 
