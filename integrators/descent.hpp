@@ -72,22 +72,6 @@ struct Safeguard {
   double least_descent = 1e-3;  ///< p descends if g'p <= -least_descent times Heading::descent
 };
 
-namespace kernels {
-
-/// |x - from|^2 in the metric of the mass.
-template <class P, class S>
-struct Travel {
-  VectorField<typename P::position, S> x, from;
-  Array<typename P::real, S> mass;
-  KOKKOS_FUNCTION void operator()(int i, Sums<typename P::sum, 1>& sums) const {
-    using Sum = typename P::sum;
-    auto const d = load3<Sum>(x, i) - load3<Sum>(from, i);
-    sums[0] += Sum(mass(i)) * dot(d, d);
-  }
-};
-
-}  // namespace kernels
-
 /// One minimisation: holds what the loop needs to know between its parts.
 template <class E, class M, class D, class Search, class Rule>
 requires Objective<E> && Preconditioner<M, E> && Direction<D, E, M> && LineSearch<Search, E> &&

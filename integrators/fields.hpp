@@ -63,6 +63,18 @@ struct LargestNorm {
   }
 };
 
+/// |x - from|^2 in the metric of the mass.
+template <class P, class S>
+struct Travel {
+  VectorField<typename P::position, S> x, from;
+  Array<typename P::real, S> mass;
+  KOKKOS_FUNCTION void operator()(int i, Sums<typename P::sum, 1>& sums) const {
+    using Sum = typename P::sum;
+    auto const d = load3<Sum>(x, i) - load3<Sum>(from, i);
+    sums[0] += Sum(mass(i)) * dot(d, d);
+  }
+};
+
 }  // namespace kernels
 
 /// What an iteration works on. Allocated by `resize` alone.

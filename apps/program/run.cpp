@@ -139,6 +139,7 @@ private:
         .set("iterations", r.iterations)
         .set("error_estimate_m", r.error_estimate_m)
         .set("error_estimate_mps", r.error_estimate_mps)
+        .set("error_floor_m", r.error_floor_m)
         .set("energy_change", r.energy_change)
         .set("gradient_norm_m", r.gradient_norm)
         .set("restarts", Record()
