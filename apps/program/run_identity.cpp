@@ -2,6 +2,8 @@
 #include <taut/apps/program/scene_document.hpp>
 #include <taut/core/io/hash.hpp>
 
+#include <fmt/format.h>
+
 #include <algorithm>
 
 namespace taut {
@@ -54,9 +56,8 @@ std::string run_identity(SceneChanges const& changes, Scene const& scene,
   SceneValue document = read_document(scene.file);
   if (changes.small) apply_small(document);
   for (std::string const& assignment : changes.overrides) apply_override(document, assignment);
-  for (char const* key : {"description", "small", "sweep"}) erase(document, key);
+  for (char const* key : {"description", "small", "sweep", "output"}) erase(document, key);
   if (SceneValue* time = document.find("time")) erase(*time, "frames");
-  if (SceneValue* output = document.find("output")) erase(*output, "obj");
   std::string text;
   std::visit(Write{text}, document.value);
 
@@ -71,7 +72,7 @@ std::string run_identity(SceneChanges const& changes, Scene const& scene,
     add(hash, force.vertices);
     add(hash, force.force);
   }
-  return text + fmt::format("\nmeshes {:016x}\n", hash.value());
+  return text + fmt::format("\nevery = {}\nmeshes {:016x}\n", scene.output.every, hash.value());
 }
 
 }  // namespace taut

@@ -69,7 +69,8 @@ class Picture:
 
     def __init__(self, frames, drawn, options):
         self.frames, self.colour = frames, options.colour
-        # The camera sees all frames; a cloud of corners of their boxes stands for them.
+        self.font = max(8, options.size[1] // 36)  # pixels
+        # The camera sees all frames.
         cloud, top = [], 0.0
         for done, frame in enumerate(drawn):
             say(f"looking at frame {frame}", done, len(drawn))
@@ -99,7 +100,8 @@ class Picture:
             self.plotter.add_mesh(surface, scalars=self.colour, cmap="viridis",
                                   clim=[0, top or 1], **look, scalar_bar_args={
                                       "title": TITLES[self.colour], "vertical": True,
-                                      "color": "#333333", "n_labels": 3, "width": 0.05,
+                                      "color": "#333333", "n_labels": 3,
+                                      "title_font_size": self.font, "label_font_size": self.font, "width": 0.05,
                                       "height": 0.4, "position_x": 0.9, "position_y": 0.3})
 
     def place_camera(self, points, options):
@@ -168,9 +170,11 @@ def animate(path, picture, chosen, fps):
         say("animating", 1, 1)
 
     if path.endswith(".gif"):
-        # One palette for all frames, or colours would flicker.
         images = [Image.fromarray(image) for image in pictures()]
-        palette = images[len(images) // 2].quantize(255)
+        # One palette for all frames, or colours would flicker; made from some of them one above the
+        # other, that none misses its colours.
+        some = images[::max(1, len(images) // 6)]
+        palette = Image.fromarray(np.concatenate([np.asarray(image) for image in some])).quantize(255)
         images = [image.quantize(palette=palette, dither=Image.Dither.NONE) for image in images]
         images[0].save(path, save_all=True, append_images=images[1:], duration=round(1000 / fps),
                        loop=0, optimize=False)
