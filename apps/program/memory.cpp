@@ -193,7 +193,7 @@ void require_memory(MeshSize const& size, SolverOptions const& solver) {
   double const needed = memory_needed(size, solver), available = memory_available();
   if (needed > available) {
     throw Error(
-        "the scene has about {:.3g} tets and needs about {:.1f} GB of memory, of which {:.1f} GB "
+        "the scene has about {:.3g} tets and needs about {:.3g} GB of memory, of which {:.3g} GB "
         "are free: lower its resolution, or use solver.precision = \"mixed\"",
         size.tets, 1e-9 * needed, 1e-9 * available);
   }
