@@ -4,6 +4,7 @@
 #include <taut/apps/program/commands.hpp>
 #include <taut/apps/program/render.hpp>
 #include <taut/apps/program/scene_value.hpp>
+#include <taut/core/io/hdf5.hpp>
 #include <taut/core/report/error.hpp>
 
 #include <fmt/core.h>
@@ -62,6 +63,7 @@ std::optional<std::string> unknown_command(CLI::App const& app, int argc, char**
 }  // namespace
 
 int main(int argc, char** argv) {
+  hdf5::leave_files_at_exit();
   CLI::App app{"taut: implicit simulation of deformable solids", "taut"};
   app.set_version_flag("--version", "taut " TAUT_VERSION);
   app.footer("example: taut run drag --small --out /tmp/drag && taut render /tmp/drag");

@@ -58,6 +58,8 @@ std::string reason() {
   return text.empty() ? "no reason given" : text;
 }
 
+void leave_files_at_exit() { check(H5dont_atexit(), "HDF5 is in use already"); }
+
 Handle::Handle(hid_t id, Close close, std::string const& what) : id_(id), close_(close) {
   if (id_ < 0) throw Error("{} ({})", what, reason());
 }

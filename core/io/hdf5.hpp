@@ -33,6 +33,10 @@ private:
 /// The innermost message of the error stack, or the operating system's if it quotes one.
 std::string reason();
 
+/// For a program, before anything else of HDF5: at its end, files that HDF5 could not close because
+/// their disk is full are left as they are. HDF5 crashes in trying again.
+void leave_files_at_exit();
+
 /// Owns one HDF5 identifier.
 class Handle {
 public:

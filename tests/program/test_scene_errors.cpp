@@ -193,7 +193,7 @@ TEST_CASE("a nearly incompressible material is a warning that counts its element
       "material = { poisson = 0.495 }\n\n[[pin]]";
   auto const warnings = build_geometry(load(replaced(plain_scene, "[[pin]]", region))).warnings;
   REQUIRE(warnings.size() == 1);
-  CHECK_THAT(warnings[0], ContainsSubstring("72 of 144 tets have a poisson of 0.495: linear") &&
+  CHECK_THAT(warnings[0], ContainsSubstring("80 of 144 tets have a poisson of 0.495: linear") &&
                               EndsWith("too little"));
 }
 
