@@ -8,6 +8,7 @@ namespace taut {
 
 /// As in Shen et al. 2024: Psi = mu/2 (I2 - 3) - mu (J - 1) + lambda/2 (J - 1)^2. Its small-strain
 /// first Lame parameter is lambda - mu: a nominal nu = 0.4 behaves like 0.375.
+/// Its bulk modulus there is lambda - mu / 3: it is unstable at rest for nu below 1/8.
 struct StableNeoHookean {
   static constexpr char const* name = "stable_neo_hookean";
   static constexpr bool allows_inversion = true;

@@ -1,15 +1,18 @@
 #include <taut/apps/program/bench.hpp>
 #include <taut/apps/program/bench_table.hpp>
+#include <taut/apps/program/scene.hpp>
 #include <taut/core/report/error.hpp>
 #include <taut/core/report/record.hpp>
 #include <taut/core/report/report_log.hpp>
 
+#include <fmt/ranges.h>
 #include <Kokkos_Core.hpp>
 #include <nlohmann/json.hpp>
 
 #include <sys/wait.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <thread>
 
 namespace taut {
@@ -102,13 +105,37 @@ std::string to_json(std::vector<BenchRow> const& rows) {
   return list.empty() ? "[]" : list + "]";
 }
 
+namespace {
+
+void require_known(char const* option, std::vector<std::string> const& words,
+                   std::vector<std::string_view> const& known) {
+  for (std::string const& word : words)
+    if (std::find(known.begin(), known.end(), word) == known.end())
+      throw Error("{} {}: choose of {}", option, word, fmt::join(known, ", "));
+}
+
+void check_options(BenchOptions const& options) {
+  std::vector<std::string_view> models;
+  for (MaterialModel const& model : material_models()) models.push_back(model.name);
+  require_known("--materials", options.materials, models);
+  require_known("--precisions", options.precisions, {"fp32", "mixed", "fp64"});
+  for (int tets : options.tets)
+    if (tets < 100 || tets > 100'000'000)
+      throw Error("--tets {}: it must be 100 to 100000000", tets);
+  if (!(options.seconds > 0)) throw Error("--seconds {}: it must be above 0", options.seconds);
+}
+
+}  // namespace
+
 int bench_command(BenchOptions const& asked) {
+  check_options(asked);
   if (Kokkos::is_initialized())
     throw Error("bench: Kokkos runs already: this is a mistake of ours");
   BenchOptions options = asked;
-  if (options.quick) {
-    options.tets = {20'000};
-    options.seconds = 0.02;
+  if (options.quick) {  // what the user has named stays
+    BenchOptions const defaults;
+    if (options.tets == defaults.tets) options.tets = {20'000};
+    if (options.seconds == defaults.seconds) options.seconds = 0.02;
   }
   if (options.threads.empty()) {
     options.threads = {1};

@@ -56,7 +56,7 @@ std::string elastic_table(Rows const& rows) {
   std::string text = fmt::format(
       "\nns per tet (share of the smaller "
       "limit)\n{:<24}{:<6}{:>9}{:>8}{:>15}{:>15}{:>16}{:>10}{:>9}"
-      "{:>7}{:>10}{:>7}\n",
+      "{:>8}{:>12}{:>8}\n",
       "material", "", "tets", "threads", "gradient+diag", "p'Hp", "iteration", "Mtets/s",
       "speed-up", "held B", "resident B", "allocs");
   int tets = 0;
@@ -67,7 +67,7 @@ std::string elastic_table(Rows const& rows) {
     BenchRow const* alone = find(rows, row, "iteration", 1);
     bool const faster = alone != nullptr && row.threads > 1;
     text += fmt::format(
-        "{:<24}{:<6}{:>9}{:>8}{:>15}{:>15}{:>16}{:>10.2f}{:>9}{:>7.0f}{:>10.0f}{:>7}\n",
+        "{:<24}{:<6}{:>9}{:>8}{:>15}{:>15}{:>16}{:>10.2f}{:>9}{:>8.0f}{:>12.0f}{:>8}\n",
         row.material, row.precision, row.tets, row.threads,
         cell(find(rows, row, "gradient", row.threads)),
         cell(find(rows, row, "quadratic_form", row.threads)), cell(&row), 1e3 / row.ns_per_tet,

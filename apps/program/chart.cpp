@@ -44,7 +44,28 @@ std::string field(double number) {
   return std::isfinite(number) ? fmt::format("{:.6g}", number) : std::string();
 }
 
+namespace {
+
+/// What would only show after all is measured. Throws Error.
+void check_options(ChartOptions const& options) {
+  auto const require = [](bool holds, char const* option, auto value, char const* must) {
+    if (!holds) throw Error("{} {}: it must be {}", option, value, must);
+  };
+  require(std::isfinite(options.target) && options.target > 0, "--target", options.target,
+          "above 0");
+  require(options.max_seconds > 0, "--seconds", options.max_seconds, "above 0");
+  require(options.repetitions > 0, "--repetitions", options.repetitions, "at least 1");
+  require(options.max_iterations > 0, "--iterations", options.max_iterations, "at least 1");
+  if (options.length) {
+    require(std::isfinite(*options.length) && *options.length > 0, "--length", *options.length,
+            "above 0 m");
+  }
+}
+
+}  // namespace
+
 int chart_command(ChartOptions const& options) {
+  check_options(options);
   std::filesystem::path const scene = find_scene(options.scene.scene);
   std::filesystem::path const out =
       options.out.empty() ? std::filesystem::path("charts") / scene.stem() : options.out;
@@ -54,11 +75,15 @@ int chart_command(ChartOptions const& options) {
                 out.string());
   }
   std::vector<ChartMethod> const methods = parse_methods(options.methods);
+  // A folder that cannot be written shows now and not when all is measured.
+  std::filesystem::path const probe = out / ".taut";
+  write_file_atomically(probe, "");
+  std::filesystem::remove(probe);
   write_file_atomically(data, options.sweep ? sweep_methods(scene, options, methods)
                                             : compare_methods(scene, options, methods));
   fmt::print("data     {}\n", data.string());
   if (options.draw) {
-    run_drawing({"draw_chart.py", {"matplotlib"}, {"matplotlib>=3.7"}},
+    run_drawing({"draw_chart.py", {"matplotlib"}, {"matplotlib>=3.7,<4"}},
                 {data.string(), (out / "chart").string()}, data);
     fmt::print("chart    {}\n", (out / "chart.png").string());
   }

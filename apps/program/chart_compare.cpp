@@ -1,5 +1,6 @@
 #include <taut/apps/program/chart_table.hpp>
 #include <taut/apps/program/chart_trace.hpp>
+#include <taut/apps/program/memory.hpp>
 
 #include <algorithm>
 
@@ -45,7 +46,7 @@ std::string compare_methods(std::filesystem::path const& file, ChartOptions cons
   Scene const scene = load_scene(file, options.scene.changes);
   std::vector<Contestant> const all =
       contestants(file, options.scene.changes, methods, options.max_iterations);
-  SceneGeometry const geometry = build_geometry(scene);
+  SceneGeometry const geometry = build_within_memory(scene);
   std::vector<int> frames = options.frames;
   if (frames.empty()) frames = {std::min(10, scene.frames)};
 

@@ -16,8 +16,8 @@ ChartMethod parse_method(std::string const& text) {
   if (title == titles.end()) {
     std::vector<std::string_view> names;
     for (MethodTitle const& t : titles) names.push_back(t.name);
-    throw Error("--methods {}: there is no method \"{}\": did you mean \"{}\"?", text, name,
-                nearest(name, names));
+    throw Error("--methods {}: there is no method \"{}\"{}; `taut methods` lists them", text, name,
+                suggestion(": did you mean \"", name, names, "\"?"));
   }
   ChartMethod method{std::string(title->title), {"solver.method=" + name}};
   while (end < text.size()) {

@@ -1,5 +1,6 @@
 #include <taut/apps/program/chart_table.hpp>
 #include <taut/apps/program/chart_trace.hpp>
+#include <taut/apps/program/memory.hpp>
 #include <taut/core/report/error.hpp>
 
 #include <algorithm>
@@ -19,20 +20,26 @@ std::string sweep_methods(std::filesystem::path const& file, ChartOptions const&
   // A method has proven itself well below the target: an error may rise again.
   TraceLimits const limits{options.target / 10, options.max_seconds, options.repetitions};
 
+  // One length for all members, the motion at the first value: what a stiff body still moves in a
+  // step may be nothing against what every method has to undo of the predicted position.
+  std::optional<double> length = options.length;
   std::string header, table = "value,method,iterations,seconds,position_error,ended\n";
   for (double value : whole.sweep->values) {
     std::vector<std::string> const member{fmt::format("{}={}", whole.sweep->key, value)};
     SceneChanges const changes = with(options.scene.changes, member);
     std::vector<Contestant> const all = contestants(file, changes, methods, options.max_iterations);
     Scene const scene = load_scene(file, changes);
-    SceneGeometry const geometry = build_geometry(scene);
+    SceneGeometry const geometry = build_within_memory(scene);
     if (header.empty()) {
       header = "# kind = sweep\n" + describe(scene, geometry) + describe_target(options) +
                fmt::format("# key = {}\n# frame = {}\n", whole.sweep->key, frame);
     }
     ReferenceStep const step = Reference(file, changes, geometry).advance_to(frame);
-    StepMeasure const measure(scene, geometry, frame, step.start, step.solution, options.length);
-    header += fmt::format("# value {:g} length_m = {:.6g}\n", value, measure.length());
+    StepMeasure const measure(scene, geometry, frame, step.start, step.solution, length);
+    length = measure.length();
+    if (value == whole.sweep->values.front()) {
+      header += fmt::format("# length_m = {:.6g}\n", measure.length());
+    }
     fmt::print("{}, step {}: errors relative to {:.4g} m\n", member[0], frame, measure.length());
     for (Contestant const& one : all) {
       auto const simulation = Simulation::create(one.scene, geometry);

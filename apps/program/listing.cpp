@@ -7,6 +7,7 @@
 #include <taut/core/report/error.hpp>
 
 #include <fmt/core.h>
+#include <fmt/ranges.h>
 
 #include <algorithm>
 #include <cstdlib>
@@ -48,25 +49,70 @@ std::filesystem::path find_scene(std::string const& name) {
   std::vector<std::string_view> names;
   for (auto const& [known, path] : scenes) names.push_back(known);
   throw Error(
-      "scene \"{}\": no file has this path and no built-in scene this name; nearest: \"{}\"", name,
-      nearest(name, names));
+      "scene \"{}\": no file has this path and no built-in scene this name{}; `taut "
+      "scenes` lists them",
+      name, suggestion(", the nearest is \"", name, names, "\""));
 }
 
 int scenes_command() {
+  int status = 0;
   for (auto const& [name, path] : built_in_scenes()) {
-    fmt::print("{:<18} {}\n", name, read_scene_title(path).description);
+    try {
+      fmt::print("{:<18} {}\n", name, read_scene_title(path).description);
+    } catch (Error const& error) {
+      fmt::print(stderr, "taut: {}\n", error.what());
+      status = 1;
+    }
   }
-  return 0;
+  return status;
 }
 
+namespace {
+
+std::string to_text(OptionValue const& value) {
+  if (auto const* flag = std::get_if<bool>(&value)) return *flag ? "true" : "false";
+  if (auto const* integer = std::get_if<int>(&value)) return std::to_string(*integer);
+  if (auto const* number = std::get_if<double>(&value)) return fmt::format("{:g}", *number);
+  return std::get<std::string>(value);
+}
+
+/// "at least 1 and at most 100", or the words to choose from.
+std::string accepted(SolverKey const& key) {
+  if (!key.choices.empty()) return fmt::format("{}", fmt::join(key.choices, ", "));
+  if (std::holds_alternative<bool>(key.fallback)) return "true, false";
+  return key.range.describe();
+}
+
+/// What ends a step.
+std::string stop_of(SolverOptions const& solver, double edge, double h, bool quasi_static) {
+  std::string const& rule = solver.text("stopping");
+  double const tolerance = solver.number("tolerance");
+  if (rule == "energy_drop")
+    return fmt::format("when an iteration gains less than {:.3g} of what the first one did",
+                       tolerance);
+  if (rule == "gradient_norm")
+    return fmt::format("when the gradient's norm is below {:.3g} of the first one", tolerance);
+  if (rule == "budget") return "after max_iterations, whatever the error is then";
+  std::string text = fmt::format("when the error is estimated to be below {:.3g} m (rms{})",
+                                 tolerance * edge, quasi_static ? "" : ", by mass");
+  if (!quasi_static) text += fmt::format(", which is {:.3g} m/s", tolerance * edge / h);
+  return text;
+}
+
+}  // namespace
+
 int methods_command() {
-  fmt::print("solver.method\n");
+  fmt::print("solver.method: what minimises the energy of a step\n");
   for (MethodTitle const& m : method_titles()) fmt::print("  {:<11} {}\n", m.name, m.description);
   for (SolverKey const& key : solver_keys()) {
-    if (key.choices.empty() || key.name == "method") continue;
-    fmt::print("solver.{} (default {})\n", key.name, std::get<std::string>(key.fallback));
-    for (auto const& choice : key.choices) fmt::print("  {}\n", choice);
-    fmt::print("    {}\n", key.help);
+    if (key.name == "method") continue;
+    fmt::print("solver.{} = {}\n", key.name, to_text(key.fallback));
+    fmt::print("  {}\n  {}\n", accepted(key), key.help);
+  }
+  fmt::print("material.model: what resists deformation\n");
+  for (MaterialModel const& model : material_models()) {
+    fmt::print("  {:<24} {}\n  {:<24} {}\n", model.name, model.description, "",
+               model.allows_inversion ? "tolerates inverted elements" : "keeps J > 0");
   }
   return 0;
 }
@@ -85,7 +131,7 @@ int plan_command(SceneArguments const& arguments) {
   if (scene.scheme == TimeScheme::quasi_static) {
     fmt::print("  (no inertia: the solve is quasi-static, each step is an equilibrium)\n");
   } else {
-    fmt::print("  inertia       lumped mass, {} with h = {:.4g} s\n",
+    fmt::print("  inertia       carries the motion on: lumped mass, {} with h = {:.4g} s\n",
                scene.scheme == TimeScheme::bdf2 ? "BDF2 (second order)"
                                                 : "implicit Euler (first order, dissipative)",
                h);
@@ -93,25 +139,24 @@ int plan_command(SceneArguments const& arguments) {
   bool const forces = !geometry.forces.empty();
   bool const gravity = scene.gravity != Point{};
   if (gravity || forces) {
-    fmt::print("  body force    {}{}{}\n", gravity ? "gravity" : "",
+    fmt::print("  body force    pulls: {}{}{}\n", gravity ? "gravity" : "",
                gravity && forces ? " and " : "", forces ? "forces of the scene" : "");
   } else {
     fmt::print("  (no body force: no gravity, no [[force]])\n");
   }
   std::set<std::string> models;
-  double stiffest = 0, softest = 1e300, slowest_wave = 1e300, fastest_wave = 0;
+  double stiffest = 0, softest = 1e300, fastest_wave = 0;
   for (MaterialParameters const& m : geometry.materials) {
     models.insert(m.model);
     stiffest = std::max(stiffest, m.young);
     softest = std::min(softest, m.young);
-    slowest_wave = std::min(slowest_wave, std::sqrt(m.young / m.density));
     fastest_wave = std::max(fastest_wave, std::sqrt(m.young / m.density));
   }
   for (std::string const& model : models) {
     bool const inverts =
         ElasticModels::with(model, []<class Model>() { return Model::allows_inversion; });
     bool const rotation = ElasticModels::with(model, []<class Model>() { return Model::use.d1; });
-    fmt::print("  elastic tets  {}: {}{}\n", model,
+    fmt::print("  elastic tets  resist deformation: {}: {}{}\n", model,
                rotation ? "needs the polar decomposition of F"
                         : "invariants alone, no polar decomposition",
                inverts ? "" : "; steps are bounded so that J > 0");
@@ -119,29 +164,48 @@ int plan_command(SceneArguments const& arguments) {
   if (!geometry.pins.empty()) {
     std::size_t pinned = 0;
     for (Pin const& pin : geometry.pins) pinned += pin.vertices.size();
-    fmt::print("  pins          {} vertices leave the unknowns while they are held\n", pinned);
+    fmt::print("  pins          prescribe {} vertices, which leave the unknowns while held\n",
+               pinned);
   }
   fmt::print("  (no contact: this version has elastic terms alone)\n");
 
   fmt::print("minimiser\n");
-  fmt::print("  method        {}\n", solver.text("method"));
-  fmt::print("  metric        {}, refreshed {}\n", solver.text("preconditioner"),
-             solver.text("refresh"));
-  fmt::print("  precision     {}\n", solver.text("precision"));
-  fmt::print("  curvature     {}\n", solver.text("curvature"));
-  fmt::print(
-      "  stop          {} at {:.3g}: an estimated error of {:.3g} m, {:.3g} m/s; at most {} "
-      "iterations\n",
-      solver.text("stopping"), solver.number("tolerance"), solver.number("tolerance") * edge,
-      solver.number("tolerance") * edge / h, solver.integer("max_iterations"));
-  // How many elements a wave crosses per step says how global a step is.
-  double const courant = fastest_wave * h / edge;
+  bool const quasi_static = scene.scheme == TimeScheme::quasi_static;
+  std::string const& method = solver.text("method");
+  for (MethodTitle const& title : method_titles())
+    if (title.name == method)
+      fmt::print("  method        finds the direction: {}, {}\n", method, title.description);
+  if (method == "newton") {
+    fmt::print("  linear solve  {}, to {:.3g} of the residual at most\n", solver.text("hessian"),
+               solver.number("linear_tolerance"));
+  }
+  std::string const& metric = solver.text("preconditioner");
+  fmt::print("  metric        evens out stiffness and mass: {}{}\n", metric,
+             metric == "identity" ? "" : ", refreshed " + solver.text("refresh"));
+  fmt::print("  curvature     keeps the metric positive where elements buckle: {}\n",
+             solver.text("curvature"));
+  fmt::print("  line search   says how far to go: {}\n", solver.text("line_search"));
+  fmt::print("  safeguard     {}\n", solver.flag("safeguard")
+                                         ? "restarts where descent is lost"
+                                         : "off: nothing keeps the energy from rising");
+  fmt::print("  precision     of numbers: {}\n", solver.text("precision"));
+  fmt::print("  stop          {}: {}; at most {} iterations\n", solver.text("stopping"),
+             stop_of(solver, edge, h, quasi_static), solver.integer("max_iterations"));
   fmt::print("advice\n");
-  fmt::print("  the fastest wave crosses {:.2g} elements per step{}\n", courant,
-             courant < 1 ? ": an explicit method would do" : "");
-  if (courant > 30 && solver.text("preconditioner") == "block_jacobi") {
+  if (!quasi_static) {
+    // How many elements a wave crosses per step says how global a step is.
+    double const courant = fastest_wave * h / edge;
+    fmt::print("  the fastest wave crosses {:.2g} elements per step{}\n", courant,
+               courant < 1 ? ": an explicit method would do" : "");
+    if (courant > 30 && solver.text("preconditioner") == "block_jacobi") {
+      fmt::print(
+          "  that is stiff: measure `taut chart {} --methods "
+          "dk,dk:preconditioner=schwarz_32,newton`\n",
+          arguments.scene);
+    }
+  } else if (method != "newton") {
     fmt::print(
-        "  that is stiff: measure `taut chart {} --methods "
+        "  without inertia the whole body answers at once: measure `taut chart {} --methods "
         "dk,dk:preconditioner=schwarz_32,newton`\n",
         arguments.scene);
   }
@@ -151,7 +215,7 @@ int plan_command(SceneArguments const& arguments) {
         "optimistic, compare with newton\n",
         stiffest / softest);
   }
-  fmt::print("  memory: about {:.2g} GB\n", 1e-9 * memory_needed(geometry, solver));
+  fmt::print("  memory: about {:.2g} GB\n", 1e-9 * memory_needed(size_of(geometry), solver));
   for (std::string const& warning : geometry.warnings) fmt::print("warning: {}\n", warning);
   return 0;
 }

@@ -3,12 +3,15 @@
 #include <taut/apps/program/chart.hpp>
 #include <taut/apps/program/commands.hpp>
 #include <taut/apps/program/render.hpp>
+#include <taut/apps/program/scene_value.hpp>
+#include <taut/core/io/hdf5.hpp>
 #include <taut/core/report/error.hpp>
 
 #include <fmt/core.h>
 #include <CLI/CLI.hpp>
 #include <Kokkos_Core.hpp>
 
+#include <algorithm>
 #include <cstdlib>
 #include <functional>
 #include <new>
@@ -21,8 +24,10 @@ using namespace taut;
 void add_scene(CLI::App& command, SceneArguments& arguments) {
   command.add_option("scene", arguments.scene, "a built-in scene (`taut scenes`) or a TOML file")
       ->capture_default_str();
-  command.add_option("--set", arguments.changes.overrides,
-                     "changes a key of the scene: --set solver.tolerance=1e-4");
+  command
+      .add_option("--set", arguments.changes.overrides,
+                  "changes a key of the scene: --set solver.tolerance=1e-4; may be repeated")
+      ->allow_extra_args(false);
   command.add_flag("--small", arguments.changes.small, "the small version of the scene");
 }
 
@@ -37,10 +42,31 @@ void add_shorthand(CLI::App& command, SceneArguments& arguments, std::string con
       help + " (" + key + ")");
 }
 
+/// A list with commas; a word after it is the next argument of the command.
+template <class T>
+CLI::Option* add_list(CLI::App& command, std::string const& option, std::vector<T>& list,
+                      std::string const& help) {
+  return command.add_option(option, list, help)->delimiter(',')->allow_extra_args(false);
+}
+
+/// A first argument that is no command: the nearest one, if there is any.
+std::optional<std::string> unknown_command(CLI::App const& app, int argc, char** argv) {
+  if (argc < 2 || argv[1][0] == '-') return {};
+  std::vector<std::string> names;
+  for (CLI::App const* sub : app.get_subcommands({})) names.push_back(sub->get_name());
+  if (std::find(names.begin(), names.end(), argv[1]) != names.end()) return {};
+  std::vector<std::string_view> const views(names.begin(), names.end());
+  return fmt::format("there is no command \"{}\"{}; `taut --help` lists them", argv[1],
+                     suggestion(": did you mean \"", argv[1], views, "\"?"));
+}
+
 }  // namespace
 
 int main(int argc, char** argv) {
-  CLI::App app{"taut: implicit simulation of deformable solids"};
+  hdf5::leave_files_at_exit();
+  CLI::App app{"taut: implicit simulation of deformable solids", "taut"};
+  app.set_version_flag("--version", "taut " TAUT_VERSION);
+  app.footer("example: taut run drag --small --out /tmp/drag && taut render /tmp/drag");
   app.require_subcommand(1);
   app.set_help_all_flag("--help-all");
   int threads = 0;
@@ -83,13 +109,13 @@ int main(int argc, char** argv) {
   bool no_drawing = false;
   auto* chart_app = app.add_subcommand("chart", "draws error against iterations and seconds");
   add_scene(*chart_app, chart.scene);
-  chart_app->add_option("--methods", chart.methods, "NAME[:KEY=VALUE...], KEY of [solver]; all")
-      ->delimiter(',');
-  chart_app->add_option("--frame", chart.frames, "time steps to compare")->delimiter(',');
+  add_list(*chart_app, "--methods", chart.methods, "NAME[:KEY=VALUE...], KEY of [solver]; all");
+  add_list(*chart_app, "--frame", chart.frames, "time steps to compare, from 1");
   chart_app->add_flag("--sweep", chart.sweep, "time to --target against the scene's [sweep]");
   chart_app->add_option("--target", chart.target, "error that counts as solved")
       ->capture_default_str();
-  chart_app->add_option("--length", chart.length, "m, what errors are relative to");
+  chart_app->add_option("--length", chart.length,
+                        "m, what errors are relative to (the motion in the step)");
   chart_app->add_option("--iterations", chart.max_iterations, "at most")->capture_default_str();
   chart_app->add_option("--seconds", chart.max_seconds, "per method, at most")
       ->capture_default_str();
@@ -107,7 +133,7 @@ int main(int argc, char** argv) {
   std::string rendered, pictures;
   auto* render_app = app.add_subcommand("render", "pictures and an animation of a result");
   render_app->add_option("result", rendered, "a folder that `taut run` wrote")->required();
-  render_app->add_option("--frames", render.frames, "numbers or last")->delimiter(',');
+  add_list(*render_app, "--frames", render.frames, "numbers or last");
   render_app->add_option("--colour", render.colour, "object, speed or displacement")
       ->capture_default_str();
   render_app->add_option("--animation", render.animation, "gif, mp4 or none")
@@ -125,22 +151,27 @@ int main(int argc, char** argv) {
   auto* bench_app = app.add_subcommand("bench", "measures kernels against the machine's limits");
   auto* elastic_app = bench_app->add_subcommand("elastic", "the elastic sweeps and an iteration");
   bench_app->require_subcommand(1);
-  elastic_app->add_option("--materials", bench.materials, "models (all)")->delimiter(',');
-  elastic_app->add_option("--precisions", bench.precisions, "fp32, mixed, fp64")->delimiter(',');
-  elastic_app->add_option("--tets", bench.tets, "sizes of the mesh")->delimiter(',');
+  bench_app->footer("example: taut bench elastic --quick");
+  add_list(*elastic_app, "--materials", bench.materials, "models (all)");
+  add_list(*elastic_app, "--precisions", bench.precisions, "fp32, mixed, fp64");
+  add_list(*elastic_app, "--tets", bench.tets, "sizes of the mesh");
   elastic_app->add_option("--seconds", bench.seconds, "spent on each number")
       ->capture_default_str();
   elastic_app->add_flag("--json", bench.json, "a JSON list of rows");
-  elastic_app->add_flag("--quick", bench.quick, "a small mesh and hasty numbers");
+  elastic_app->add_flag("--quick", bench.quick,
+                        "a small mesh and hasty numbers, where --tets and --seconds say nothing");
   elastic_app->footer("example: taut bench elastic --materials stable_neo_hookean --tets 500000");
-  elastic_app->add_option("--threads", bench.threads, "numbers of threads (1 and all)")
-      ->delimiter(',')
+  add_list(*elastic_app, "--threads", bench.threads, "numbers of threads (1 and all)")
       ->check(CLI::Range(1, 4096));
   elastic_app->callback([&] { command = [&] { return bench_command(bench); }; });
 
   for (CLI::App* sub : app.get_subcommands({})) {
     if (sub == bench_app) continue;
     sub->add_option("--threads", threads, "threads to use (all)")->check(CLI::Range(1, 4096));
+  }
+  if (auto const message = unknown_command(app, argc, argv)) {
+    fmt::print(stderr, "taut: {}\n", *message);
+    return 1;
   }
   CLI11_PARSE(app, argc, argv);
 

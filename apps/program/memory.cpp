@@ -1,18 +1,177 @@
 #include <taut/apps/program/memory.hpp>
 #include <taut/core/report/error.hpp>
 
+#include <fmt/core.h>
+
+#include <algorithm>
+#include <cmath>
 #include <fstream>
 #include <limits>
+#include <numbers>
+#include <sstream>
 #include <string>
 
 namespace taut {
+namespace {
 
-double memory_needed(SceneGeometry const& geometry, SolverOptions const& solver) {
-  double const tets = double(geometry.mesh.tets.size());
-  double const vertices = double(geometry.mesh.points.size());
+namespace fs = std::filesystem;
+
+constexpr double unlimited = std::numeric_limits<double>::infinity();
+
+/// Twelve tets per cell of the lattice, and half a face's four for every face on the boundary.
+MeshSize block(double x, double y, double z) {
+  double const faces = 2 * (x * y + y * z + z * x);
+  return {x * y * z + (x + 1) * (y + 1) * (z + 1) + faces, 12 * x * y * z + 2 * faces};
+}
+
+/// A block of size[] metres in cells of `cell` metres.
+MeshSize block(Point const& size, double cell) {
+  auto const cells = [&](double length) { return std::max(1.0, std::round(length / cell)); };
+  return block(cells(size[0]), cells(size[1]), cells(size[2]));
+}
+
+struct SizeOfShape {
+  int resolution;
+
+  MeshSize operator()(BoxShape const& box) const {
+    double const longest = *std::max_element(box.size.begin(), box.size.end());
+    return block(box.size, longest / resolution);
+  }
+  MeshSize operator()(BoxUnionShape const& shape) const {
+    double longest = 0;
+    for (int a = 0; a < 3; ++a) {
+      double low = unlimited, high = -unlimited;
+      for (auto const& box : shape.boxes) {
+        low = std::min(low, box[0][a]);
+        high = std::max(high, box[1][a]);
+      }
+      longest = std::max(longest, high - low);
+    }
+    MeshSize sum;
+    for (auto const& [low, high] : shape.boxes) {
+      MeshSize const one =
+          block({high[0] - low[0], high[1] - low[1], high[2] - low[2]}, longest / resolution);
+      sum = {sum.vertices + one.vertices, sum.tets + one.tets};
+    }
+    return sum;
+  }
+  /// The spine and three arms, put in a row.
+  MeshSize operator()(LetterEShape const& letter) const {
+    double const unit = letter.height / 9;
+    return block({2 * unit, 18 * unit, letter.depth}, letter.height / resolution);
+  }
+  MeshSize operator()(CylinderShape const& cylinder) const {
+    double const across = 2 * cylinder.radius;
+    return block({across, across, cylinder.length}, across / resolution);
+  }
+  MeshSize operator()(SphereShape const&) const {
+    return block(resolution, resolution, resolution);
+  }
+  MeshSize operator()(TorusShape const& torus) const {
+    double const across = 2 * torus.tube_radius;
+    return block({across, across, 2 * std::numbers::pi * torus.radius}, across / resolution);
+  }
+};
+
+/// The number that a file begins with, after comments; 0 if it begins with something else.
+double first_number(fs::path const& path) {
+  std::ifstream file(path);
+  for (std::string line; std::getline(file, line);) {
+    if (line.empty() || line[0] == '#') continue;
+    double number = 0;
+    std::istringstream(line) >> number;
+    return number;
+  }
+  return 0;
+}
+
+MeshSize size_of_file(fs::path const& path) {
+  if (path.extension() == ".node" || path.extension() == ".ele") {
+    return {first_number(fs::path(path).replace_extension(".node")),
+            first_number(fs::path(path).replace_extension(".ele"))};
+  }
+  // A tet of a gmsh file takes some 40 bytes, as text or not; there are five for every vertex.
+  std::error_code none;
+  double const bytes = static_cast<double>(fs::file_size(path, none));
+  return none ? MeshSize{} : MeshSize{bytes / 200, bytes / 40};
+}
+
+/// A file that holds one number, or "max".
+double number_in(fs::path const& path) {
+  std::ifstream file(path);
+  double number = unlimited;
+  return file >> number ? number : unlimited;
+}
+
+/// The value in a file of lines "NAME VALUE"; 0 if there is none.
+double value_in(fs::path const& path, std::string const& name) {
+  std::ifstream file(path);
+  std::string word;
+  while (file >> word) {
+    double value = 0;
+    if (word == name && file >> value) return value;
+  }
+  return 0;
+}
+
+/// What one control group leaves; its file cache can be taken back.
+double group_leaves(fs::path const& folder, char const* limit, char const* usage) {
+  double const most = number_in(folder / limit), used = number_in(folder / usage);
+  if (!(most < unlimited) || !(used < unlimited)) return unlimited;
+  return std::max(0.0, most - used + value_in(folder / "memory.stat", "inactive_file"));
+}
+
+/// The least that the groups of this process, and those around them, leave.
+double groups_leave(fs::path const& root) {
+  double least = unlimited;
+  std::ifstream file(root / "proc/self/cgroup");
+  for (std::string line; std::getline(file, line);) {  // "0::/user/group" or "4:memory:/group"
+    std::size_t const second = line.find(':', line.find(':') + 1);
+    if (second == std::string::npos) continue;
+    bool const unified = line.starts_with("0::");
+    if (!unified && line.find(":memory:") == std::string::npos) continue;
+    fs::path const mount = root / (unified ? "sys/fs/cgroup" : "sys/fs/cgroup/memory");
+    // In a container the path can be that outside: then what is mounted is the group itself.
+    for (fs::path group = line.substr(second + 1);; group = group.parent_path()) {
+      fs::path const folder = mount / group.relative_path();
+      least = std::min(
+          least, unified ? group_leaves(folder, "memory.max", "memory.current")
+                         : group_leaves(folder, "memory.limit_in_bytes", "memory.usage_in_bytes"));
+      if (!group.has_relative_path()) break;
+    }
+  }
+  return least;
+}
+
+}  // namespace
+
+MeshSize estimate_size(Scene const& scene) {
+  MeshSize sum;
+  for (SceneObject const& object : scene.objects) {
+    auto const* file = std::get_if<fs::path>(&object.geometry);
+    MeshSize one;
+    if (file) {
+      one = size_of_file(*file);
+    } else {
+      auto const& [shape, resolution] = std::get<ProceduralShape>(object.geometry);
+      one = std::visit(SizeOfShape{resolution}, shape);
+    }
+    sum = {sum.vertices + one.vertices, sum.tets + one.tets};
+  }
+  return sum;
+}
+
+MeshSize size_of(SceneGeometry const& geometry) {
+  return {double(geometry.mesh.points.size()), double(geometry.mesh.tets.size())};
+}
+
+double memory_needed(MeshSize const& size, SolverOptions const& solver) {
+  auto const [vertices, tets] = size;
   double const real = solver.text("precision") == "fp64" ? 8 : 4;
-  // Element data and slots, the fields of state and minimiser, and the mesh that is kept.
-  double bytes = tets * (14 * real + 60) + vertices * (30 * real + 400);
+  // The program itself; element data and slots, the fields of state and minimiser; the mesh in the
+  // scene's and the solver's order, with what sorting and checking it takes (measured: 1e5 to 4e5
+  // tets).
+  double bytes = 2.5e7 + tets * (14 * real + 60 + 130) + vertices * (30 * real + 400);
   bool const assembles =
       solver.text("method") == "newton" && solver.text("hessian") != "matrix_free";
   bool const schwarz = solver.text("preconditioner").starts_with("schwarz");
@@ -25,24 +184,31 @@ double memory_needed(SceneGeometry const& geometry, SolverOptions const& solver)
   return bytes;
 }
 
-double memory_available() {
-  std::ifstream meminfo("/proc/meminfo");
-  std::string word;
-  while (meminfo >> word) {
-    double kilobytes;
-    if (word == "MemAvailable:" && meminfo >> kilobytes) return 1024 * kilobytes;
-  }
-  return std::numeric_limits<double>::infinity();
+double memory_available(fs::path const& root) {
+  double const kilobytes = value_in(root / "proc/meminfo", "MemAvailable:");
+  return std::min(kilobytes > 0 ? 1024 * kilobytes : unlimited, groups_leave(root));
 }
 
-void require_memory(SceneGeometry const& geometry, SolverOptions const& solver) {
-  double const needed = memory_needed(geometry, solver), available = memory_available();
+void require_memory(MeshSize const& size, SolverOptions const& solver) {
+  double const needed = memory_needed(size, solver), available = memory_available();
   if (needed > available) {
     throw Error(
-        "the scene has {} tets and needs about {:.1f} GB of memory, of which {:.1f} GB are free: "
-        "lower its resolution, or use solver.precision = \"mixed\"",
-        geometry.mesh.tets.size(), 1e-9 * needed, 1e-9 * available);
+        "the scene has about {:.3g} tets and needs about {:.3g} GB of memory, of which {:.3g} GB "
+        "are free: lower its resolution, or use solver.precision = \"mixed\"",
+        size.tets, 1e-9 * needed, 1e-9 * available);
   }
+}
+
+SceneGeometry build_within_memory(Scene const& scene) {
+  MeshSize const expected = estimate_size(scene);
+  require_memory(expected, scene.solver);
+  if (expected.tets > 2e6) {
+    fmt::print(stderr, "taut: building a mesh of about {:.1f} million tets\n",
+               1e-6 * expected.tets);
+  }
+  SceneGeometry geometry = build_geometry(scene);
+  require_memory(size_of(geometry), scene.solver);
+  return geometry;
 }
 
 }  // namespace taut

@@ -5,11 +5,26 @@
 
 namespace taut {
 
-/// Bytes, an upper estimate from the number of tets and vertices and the solver's data structures.
-double memory_needed(SceneGeometry const& geometry, SolverOptions const& solver);
-/// Bytes that the system can give; infinity where it does not say.
-double memory_available();
-/// Throws Error if the scene needs more than there is.
-void require_memory(SceneGeometry const& geometry, SolverOptions const& solver);
+/// How large a mesh is or will be.
+struct MeshSize {
+  double vertices = 0;
+  double tets = 0;
+};
+
+/// Of all objects of a scene, before anything is built: from the lattices of shapes and the headers
+/// of mesh files, or their length where there is no header. Right to some ten percent.
+MeshSize estimate_size(Scene const& scene);
+MeshSize size_of(SceneGeometry const& geometry);
+
+/// Bytes, an upper estimate of what meshing, checking and stepping take at a time.
+double memory_needed(MeshSize const& size, SolverOptions const& solver);
+/// Bytes that the system, and a control group (1 or 2) that this process is in, can still give;
+/// infinity where they do not say. `root`: of /proc and /sys.
+double memory_available(std::filesystem::path const& root = "/");
+/// Throws Error if a mesh of this size needs more than there is.
+void require_memory(MeshSize const& size, SolverOptions const& solver);
+
+/// build_geometry() once it is known to fit; says so on stderr if it will take long.
+SceneGeometry build_within_memory(Scene const& scene);
 
 }  // namespace taut

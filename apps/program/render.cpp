@@ -74,7 +74,7 @@ int render_command(RenderOptions const& options) {
                    {"--colour", options.colour, "--size", std::to_string(options.width),
                     std::to_string(options.height), "--view"});
   for (double v : options.view) arguments.push_back(fmt::format("{}", v));
-  DrawingScript script{"draw_result.py", {"pyvista"}, {"pyvista>=0.44", "vtk>=9.4"}};
+  DrawingScript script{"draw_result.py", {"pyvista"}, {"pyvista>=0.47,<0.50", "vtk>=9.4,<9.8"}};
   if (options.animation != "none" && frames > 1) {
     fs::path const animation = out / ("animation." + options.animation);
     require_absent(animation, options.force);
@@ -83,7 +83,7 @@ int render_command(RenderOptions const& options) {
                                        "--most-frames", std::to_string(options.most_frames)});
     if (options.animation == "mp4") {
       script.modules.insert(script.modules.end(), {"imageio", "imageio_ffmpeg"});
-      script.packages.insert(script.packages.end(), {"imageio", "imageio-ffmpeg"});
+      script.packages.insert(script.packages.end(), {"imageio<3", "imageio-ffmpeg<1"});
     }
   }
   fs::create_directories(out);

@@ -2,6 +2,7 @@
 #include <taut/apps/program/commands.hpp>
 #include <taut/apps/program/memory.hpp>
 #include <taut/apps/program/methods.hpp>
+#include <taut/apps/program/run_identity.hpp>
 #include <taut/apps/program/simulation.hpp>
 #include <taut/core/io/checkpoint.hpp>
 #include <taut/core/io/mesh_reader.hpp>
@@ -13,17 +14,20 @@
 
 #include <fmt/core.h>
 
+#include <algorithm>
 #include <csignal>
-#include <fstream>
 #include <optional>
-#include <sstream>
 
 namespace taut {
 
 namespace {
 
 std::sig_atomic_t volatile interrupted = 0;
-void interrupt(int signal) { interrupted = signal; }
+/// A second signal of the kind ends the process as it would have without us.
+void interrupt(int signal) {
+  interrupted = signal;
+  std::signal(signal, SIG_DFL);
+}
 
 /// Ctrl-C and TERM end a run after the step in progress.
 class Signals {
@@ -43,16 +47,35 @@ private:
   void (*before_term_)(int);
 };
 
-/// What of a scene decides its course: a checkpoint of one text does not fit another. The number of
-/// frames may change, so that a run can be prolonged.
-std::string scene_text(Scene const& scene, SceneChanges const& changes) {
-  std::ifstream file(scene.file);
-  std::ostringstream text;
-  text << file.rdbuf() << "\nsmall = " << changes.small << "\n";
-  for (std::string const& change : changes.overrides) {
-    if (!change.starts_with("time.frames=")) text << change << "\n";
+/// Sums over all steps of a run, the legs before its restarts included.
+struct Totals {
+  double seconds = 0;
+  double steps = 0, converged = 0, iterations = 0, restarts = 0;
+  double worst_error = 0;     ///< m
+  double most_inverted = 0;   ///< elements in one step
+  double inverted_steps = 0;  ///< steps that end with inverted elements
+
+  std::vector<double> to_numbers() const {
+    return {seconds,  steps,       converged,     iterations,
+            restarts, worst_error, most_inverted, inverted_steps};
   }
-  return text.str();
+  static Totals from_numbers(std::vector<double> const& n) {
+    if (n.size() != 8) throw Error("the checkpoint's totals are not eight numbers");
+    return {n[0], n[1], n[2], n[3], n[4], n[5], n[6], n[7]};
+  }
+  double mean_iterations() const { return steps > 0 ? iterations / steps : 0; }
+  double per_second() const { return seconds > 0 ? steps / seconds : 0; }
+};
+
+/// Removes what an earlier run left that this one does not overwrite at once.
+void clear_folder(std::filesystem::path const& folder) {
+  for (char const* name : {"checkpoint.h5", "summary.json", "report.jsonl"})
+    std::filesystem::remove(folder / name);
+  std::error_code none;
+  for (auto const& entry : std::filesystem::directory_iterator(folder / "obj", none)) {
+    std::string const name = entry.path().filename().string();
+    if (name.starts_with("frame_") && name.ends_with(".obj")) std::filesystem::remove(entry.path());
+  }
 }
 
 class Run {
@@ -61,60 +84,97 @@ public:
       : scene_(scene),
         geometry_(geometry),
         folder_(options.out.empty() ? std::filesystem::path("results") / scene.name : options.out),
-        text_(scene_text(scene, options.scene.changes)),
+        text_(run_identity(options.scene.changes, scene, geometry)),
         simulation_(Simulation::create(scene, geometry)) {
     if (options.restart) {
-      Checkpoint const checkpoint = read_checkpoint(folder_ / "checkpoint.h5", text_);
-      simulation_->restore(checkpoint);
-      std::int64_t const written = checkpoint.number<std::int32_t>("frames_written");
-      result_.emplace(ResultWriter::resume(result_path(), result_mesh(), written, capacity()));
+      go_on();
     } else {
-      if (!options.force && std::filesystem::exists(result_path())) {
-        throw Error(
-            "{}: a result is there already: choose another --out, continue it with --restart or "
-            "replace it with --force",
-            folder_.string());
-      }
-      result_.emplace(ResultWriter::create(
-          result_path(), result_mesh(), capacity(),
-          options.force ? ResultWriter::IfExists::replace : ResultWriter::IfExists::refuse));
-      write_frame();
+      begin(options.force);
     }
-    // Line k of the report is step k, counted from 1.
-    log_.emplace(folder_ / "report.jsonl", options.restart ? simulation_->steps() + 1 : 0);
   }
 
   int run() {
     int const first = simulation_->steps();
-    ProgressLine progress(scene_.frames, "frames", first);
+    double const seconds_before = totals_.seconds;
+    ProgressLine progress(scene_.frames, "steps", first);
     Timer since_checkpoint;
     Signals const signals;
     try {
       while (simulation_->steps() < scene_.frames && !interrupted) {
         step();
-        if (simulation_->steps() % scene_.output.every == 0) write_frame();
+        if (on_grid() || simulation_->steps() == scene_.frames) write_frame();
+        recorded_ = simulation_->steps();
         if (since_checkpoint.seconds() > 10) {
           checkpoint();
           since_checkpoint.restart();
         }
         progress.update(simulation_->steps(), note_);
       }
-    } catch (Error const&) {
       progress.finish();
       checkpoint();
-      summarise("stopped by an error");
+      summarise(interrupted ? "interrupted" : "finished");
+    } catch (std::exception const&) {
+      progress.finish();
+      // A step that is not wholly on disk is taken again from the checkpoint before it.
+      if (recorded_ == simulation_->steps()) attempt([&] { checkpoint(); });
+      attempt([&] { summarise("stopped by an error"); });
       throw;
     }
-    progress.finish();
-    checkpoint();
-    summarise(interrupted ? "interrupted" : "finished");
-    say_where(first);
+    say_where(first, totals_.seconds - seconds_before);
     return interrupted ? 128 + interrupted : 0;
   }
 
 private:
+  /// On the way out of an error, which must not be hidden by another one.
+  template <class Action>
+  static void attempt(Action&& action) {
+    try {
+      action();
+    } catch (std::exception const& error) {
+      fmt::print(stderr, "taut: {}\n", error.what());
+    }
+  }
+
+  void begin(bool force) {
+    if (std::filesystem::exists(result_path())) {
+      if (!force) {
+        throw Error(
+            "{}: a result is there already: choose another --out, continue it with --restart or "
+            "replace it with --force",
+            folder_.string());
+      }
+      clear_folder(folder_);
+    }
+    result_.emplace(ResultWriter::create(
+        result_path(), result_mesh(), capacity(),
+        force ? ResultWriter::IfExists::replace : ResultWriter::IfExists::refuse));
+    write_frame();
+    log_.emplace(folder_ / "report.jsonl");
+    checkpoint();
+  }
+
+  void go_on() {
+    Checkpoint const checkpoint = read_checkpoint(folder_ / "checkpoint.h5", text_);
+    simulation_->restore(checkpoint);
+    recorded_ = simulation_->steps();
+    totals_ = Totals::from_numbers(checkpoint.get<double>("totals"));
+    std::int64_t written = checkpoint.number<std::int32_t>("frames_written");
+    // The last state of a shorter run lies between the frames of a longer one.
+    if (recorded_ < scene_.frames) {
+      written = std::min(written, std::int64_t{recorded_ / scene_.output.every + 1});
+    }
+    result_.emplace(ResultWriter::resume(result_path(), result_mesh(), written, capacity()));
+    // Line k of the report is step k, counted from 1.
+    log_.emplace(folder_ / "report.jsonl", recorded_ + 1);
+  }
+
+  bool on_grid() const { return simulation_->steps() % scene_.output.every == 0; }
+
   std::filesystem::path result_path() const { return folder_ / "result.vtkhdf"; }
-  std::int64_t capacity() const { return scene_.frames / scene_.output.every + 1; }
+  /// Every so many steps, and the last one.
+  std::int64_t capacity() const {
+    return (scene_.frames + scene_.output.every - 1) / scene_.output.every + 1;
+  }
 
   ResultMesh result_mesh() const {
     ResultMesh mesh{geometry_.mesh, geometry_.object_of_tet, {}};
@@ -126,11 +186,11 @@ private:
   void step() {
     Timer const timer;
     NewtonReport const r = simulation_->step();
-    seconds_ += timer.seconds();
-    ++steps_;
-    iterations_ += r.iterations;
-    converged_ += r.converged();
-    restarts_ += r.restarts.total();
+    totals_.seconds += timer.seconds();
+    ++totals_.steps;
+    totals_.iterations += r.iterations;
+    totals_.converged += r.converged();
+    totals_.restarts += static_cast<double>(r.restarts.total());
     Record line;
     line.set("frame", simulation_->steps())
         .set("time", simulation_->time())
@@ -155,11 +215,12 @@ private:
         .set("seconds", timer.seconds());
     if (scene_.output.check) {
       auto const inverted = inverted_tets(geometry_.mesh, simulation_->positions()).size();
-      inverted_ = std::max(inverted_, inverted);
+      totals_.most_inverted = std::max(totals_.most_inverted, static_cast<double>(inverted));
+      totals_.inverted_steps += inverted > 0;
       line.set("inverted", inverted);
     }
     log_->write(line);
-    worst_error_ = std::max(worst_error_, r.error_estimate_m);
+    totals_.worst_error = std::max(totals_.worst_error, r.error_estimate_m);
     note_ = fmt::format("{} its, error {:.1e} m{}", r.iterations, r.error_estimate_m,
                         r.converged() ? "" : fmt::format(", {}", to_string(r.stop)));
   }
@@ -178,6 +239,7 @@ private:
     simulation_->save(checkpoint);
     checkpoint.set("frames_written",
                    std::vector<std::int32_t>{static_cast<std::int32_t>(result_->frames())});
+    checkpoint.set("totals", totals_.to_numbers());
     write_checkpoint(folder_ / "checkpoint.h5", checkpoint, text_);
   }
 
@@ -192,25 +254,37 @@ private:
         .set("precision", scene_.solver.text("precision"))
         .set("frames", simulation_->steps())
         .set("frames_asked", scene_.frames)
-        .set("steps_of_this_run", steps_)
-        .set("steps_converged", converged_)
-        .set("mean_iterations", steps_ > 0 ? double(iterations_) / steps_ : 0)
-        .set("restarts", restarts_)
-        .set("largest_error_estimate_m", worst_error_)
-        .set("most_inverted_elements", inverted_)
-        .set("seconds", seconds_)
-        .set("frames_per_second", seconds_ > 0 ? steps_ / seconds_ : 0)
+        .set("steps_converged", static_cast<std::int64_t>(totals_.converged))
+        .set("mean_iterations", totals_.mean_iterations())
+        .set("restarts", static_cast<std::int64_t>(totals_.restarts))
+        .set("largest_error_estimate_m", totals_.worst_error)
+        .set("most_inverted_elements", static_cast<std::int64_t>(totals_.most_inverted))
+        .set("steps_with_inverted_elements", static_cast<std::int64_t>(totals_.inverted_steps))
+        .set("seconds", totals_.seconds)
+        .set("frames_per_second", totals_.per_second())
         .set("warnings", geometry_.warnings);
     write_summary(folder_ / "summary.json", summary);
   }
 
-  void say_where(int first) const {
-    fmt::print(
-        "{} {}: frames {} to {} in {:.1f} s ({:.1f} per second), {:.1f} iterations each, {} of "
-        "{} steps converged, largest error estimate {:.1e} m\n",
-        scene_.name, interrupted ? "interrupted" : "done", first, simulation_->steps(), seconds_,
-        seconds_ > 0 ? steps_ / seconds_ : 0, steps_ > 0 ? double(iterations_) / steps_ : 0,
-        converged_, steps_, worst_error_);
+  void say_where(int first, double seconds) const {
+    int const steps = simulation_->steps() - first;
+    if (steps == 0) {
+      fmt::print("{}: nothing to do, all {} steps are there; --frames asks for more\n", scene_.name,
+                 first);
+    } else {
+      fmt::print(
+          "{} {}: steps {} to {} in {:.1f} s ({:.1f} per second); {:.1f} iterations each, {:.0f} "
+          "of {:.0f} steps converged, largest error estimate {:.1e} m\n",
+          scene_.name, interrupted ? "interrupted" : "done", first + 1, simulation_->steps(),
+          seconds, seconds > 0 ? steps / seconds : 0, totals_.mean_iterations(), totals_.converged,
+          totals_.steps, totals_.worst_error);
+    }
+    if (totals_.inverted_steps > 0) {
+      fmt::print(
+          "inverted elements in {:.0f} of {:.0f} steps, at most {:.0f} of {} at a time: this "
+          "material tolerates them; neo_hookean does not let them be\n",
+          totals_.inverted_steps, totals_.steps, totals_.most_inverted, geometry_.mesh.tets.size());
+    }
     fmt::print("result   {}   (ParaView: open it, or {} before 5.12)\n", result_path().string(),
                "result.xdmf");
     fmt::print("pictures ./taut render {}\n", folder_.string());
@@ -227,18 +301,15 @@ private:
   std::optional<JsonLines> log_;
   std::vector<Triangle> boundary_;
   std::string note_;
-  int steps_ = 0, converged_ = 0;
-  std::int64_t iterations_ = 0, restarts_ = 0;
-  std::size_t inverted_ = 0;
-  double seconds_ = 0, worst_error_ = 0;
+  Totals totals_;
+  int recorded_ = 0;  ///< steps whose line and frame are written
 };
 
 }  // namespace
 
 int run_command(RunOptions const& options) {
   Scene const scene = load_scene(find_scene(options.scene.scene), options.scene.changes);
-  SceneGeometry const geometry = build_geometry(scene);
-  require_memory(geometry, scene.solver);
+  SceneGeometry const geometry = build_within_memory(scene);
   for (std::string const& warning : geometry.warnings) fmt::print(stderr, "warning: {}\n", warning);
   return Run(scene, geometry, options).run();
 }

@@ -27,6 +27,7 @@ struct MaterialParameters {
 struct MaterialModel {
   std::string_view name;
   bool allows_inversion;  ///< defined for J <= 0
+  std::string_view description;
 };
 std::span<MaterialModel const> material_models();
 

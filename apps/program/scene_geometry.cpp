@@ -93,6 +93,21 @@ void assign_regions(SceneObject const& object, ObjectPart const& part, SceneGeom
   }
 }
 
+/// Materials from number `first` on, of the object's tets from `part.first_tet` on.
+void warn_of_locking(SceneObject const& object, ObjectPart const& part, std::size_t first,
+                     SceneGeometry& geometry) {
+  for (std::size_t m = first; m < geometry.materials.size(); ++m) {
+    double const poisson = geometry.materials[m].poisson;
+    if (!(poisson > 0.49)) continue;
+    auto const count = std::count(geometry.material_of_tet.begin() + part.first_tet,
+                                  geometry.material_of_tet.end(), static_cast<std::int32_t>(m));
+    geometry.warnings.push_back(fmt::format(
+        "{}: {} of {} tets have a poisson of {}: linear tetrahedra lock above 0.49 and deform too "
+        "little",
+        object.where, count, part.tets, poisson));
+  }
+}
+
 void add_object(SceneObject const& object, SceneGeometry& geometry) {
   TetMesh const mesh = object_mesh(object, geometry.warnings);
   TetMesh& all = geometry.mesh;
@@ -116,8 +131,10 @@ void add_object(SceneObject const& object, SceneGeometry& geometry) {
                                 static_cast<std::int32_t>(geometry.objects.size()));
   geometry.material_of_tet.resize(all.tets.size(),
                                   static_cast<std::int32_t>(geometry.materials.size()));
+  std::size_t const first_material = geometry.materials.size();
   geometry.materials.push_back(object.material);
   assign_regions(object, part, geometry);
+  warn_of_locking(object, part, first_material, geometry);
 
   geometry.start.insert(geometry.start.end(), all.points.begin() + part.first_vertex,
                         all.points.end());

@@ -13,8 +13,7 @@ std::vector<std::string_view> model_names() {
 }
 
 /// `base` gives the keys that are left out; without it all but the model are required.
-MaterialParameters read_material(Section const& section, MaterialParameters const* base,
-                                 std::vector<std::string>& warnings) {
+MaterialParameters read_material(Section const& section, MaterialParameters const* base) {
   section.allow({"model", "young", "poisson", "density"});
   auto const inherited = [&](double MaterialParameters::*member) {
     return base ? std::optional<double>(base->*member) : std::nullopt;
@@ -30,10 +29,12 @@ MaterialParameters read_material(Section const& section, MaterialParameters cons
   material.density =
       section.number("density", {.min = 0, .max = 1e9, .open_min = true, .unit = "kg/m^3"},
                      inherited(&MaterialParameters::density));
-  if (material.poisson > 0.49)
-    warnings.push_back(
-        fmt::format("{}.poisson is {}: linear tetrahedra lock above 0.49 and deform too little",
-                    section.where(), material.poisson));
+  // Its bulk modulus is lambda - mu / 3.
+  if (material.model == "stable_neo_hookean" && material.poisson <= 0.125)
+    throw Error(
+        "{}.poisson is {}: stable_neo_hookean has no stable rest state at or below 0.125: use "
+        "model = \"stable_neo_hookean_2018\"",
+        section.where(), material.poisson);
   return material;
 }
 
@@ -169,11 +170,14 @@ void require_start_allowed(SceneObject const& object) {
 }  // namespace
 
 std::span<MaterialModel const> material_models() {
-  static constexpr std::array<MaterialModel, 5> models{{{"stable_neo_hookean", true},
-                                                        {"stable_neo_hookean_2018", true},
-                                                        {"neo_hookean", false},
-                                                        {"fixed_corotated", true},
-                                                        {"arap", true}}};
+  static constexpr std::array<MaterialModel, 5> models{
+      {{"stable_neo_hookean", true,
+        "as in the PNCG paper: cheapest; nu above 1/8; softer in volume than its nu says "
+        "(default)"},
+       {"stable_neo_hookean_2018", true, "Smith et al. 2018: nominal moduli at small strain"},
+       {"neo_hookean", false, "with a logarithm of J, which no step may bring to zero"},
+       {"fixed_corotated", true, "Stomakhin et al. 2012: needs the rotation of F"},
+       {"arap", true, "as rigid as possible: mu alone, Poisson's ratio has no effect"}}};
   return models;
 }
 
@@ -196,12 +200,12 @@ SceneObject read_object(Section const& section, Scene& scene) {
   object.placement = read_placement(section);
   if (auto const velocity = section.section("velocity")) object.velocity = read_velocity(*velocity);
   Section const material(section.at("material"), section.path("material"));
-  object.material = read_material(material, nullptr, scene.warnings);
+  object.material = read_material(material, nullptr);
   for (Section const& region : section.list("region")) {
     region.allow({"name", "select", "material"});
     Section const changed(region.at("material"), region.path("material"));
     object.regions.push_back({region.where(), read_selection(region, scene.file),
-                              read_material(changed, &object.material, scene.warnings)});
+                              read_material(changed, &object.material)});
   }
   object.start = read_start(section);
   require_start_allowed(object);

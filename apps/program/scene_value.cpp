@@ -85,6 +85,16 @@ std::string_view nearest(std::string_view word, std::span<std::string_view const
   });
 }
 
+std::string suggestion(std::string_view before, std::string_view word,
+                       std::span<std::string_view const> candidates, std::string_view after) {
+  if (candidates.empty()) return {};
+  std::string_view const near = nearest(word, candidates);
+  std::size_t const most = std::max<std::size_t>(2, std::min(word.size(), near.size()) / 3);
+  // Two edits turn any short word into any other.
+  if (edit_distance(word, near) > std::min(most, std::max(word.size(), near.size()) - 1)) return {};
+  return fmt::format("{}{}{}", before, near, after);
+}
+
 bool read_flag(SceneValue const& value, std::string_view path) {
   return get<bool>(value, path, "true or false");
 }
@@ -110,8 +120,8 @@ std::string read_choice(SceneValue const& value, std::string_view path,
                         std::span<std::string_view const> choices) {
   std::string const& text = read_text(value, path);
   if (std::find(choices.begin(), choices.end(), text) == choices.end())
-    throw Error("{}: {} is '{}', nearest is '{}': choose one of {}", value.place, path, text,
-                nearest(text, choices), fmt::join(choices, ", "));
+    throw Error("{}: {} is '{}'{}: choose one of {}", value.place, path, text,
+                suggestion(", nearest is '", text, choices, "'"), fmt::join(choices, ", "));
   return text;
 }
 
@@ -152,8 +162,9 @@ Section::Section(SceneValue const& table, std::string path)
 void Section::allow(std::span<std::string_view const> keys) const {
   for (auto const& [key, member] : std::get<SceneValue::Table>(table_->value))
     if (std::find(keys.begin(), keys.end(), key) == keys.end())
-      throw Error("{}: unknown key '{}', the nearest is '{}': {} knows {}", member.place, path(key),
-                  nearest(key, keys), path_.empty() ? "a scene" : path_, fmt::join(keys, ", "));
+      throw Error("{}: unknown key '{}'{}: {} knows {}", member.place, path(key),
+                  suggestion(", the nearest is '", key, keys, "'"),
+                  path_.empty() ? "a scene" : path_, fmt::join(keys, ", "));
 }
 
 std::string Section::path(std::string_view key) const {

@@ -46,6 +46,10 @@ struct Range {
 
 /// The candidate with the smallest edit distance to `word`. Requires at least one candidate.
 std::string_view nearest(std::string_view word, std::span<std::string_view const> candidates);
+/// `before` the candidate nearest to `word`, `after`; nothing where none is near enough for a slip
+/// of the hand.
+std::string suggestion(std::string_view before, std::string_view word,
+                       std::span<std::string_view const> candidates, std::string_view after);
 
 /// Checked value reading; `path` is the key as `--set` would name it. All throw Error.
 bool read_flag(SceneValue const& value, std::string_view path);

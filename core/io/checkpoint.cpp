@@ -1,5 +1,6 @@
 #include <taut/core/io/checkpoint.hpp>
 #include <taut/core/io/file.hpp>
+#include <taut/core/io/hash.hpp>
 #include <taut/core/io/hdf5.hpp>
 
 namespace taut {
@@ -8,41 +9,27 @@ namespace {
 namespace fs = std::filesystem;
 using hdf5::Handle;
 
-constexpr std::int64_t format_version = 1;
-
-/// FNV-1a in 64 bits (http://www.isthe.com/chongo/tech/comp/fnv).
-class Hash {
-public:
-  void add(void const* data, std::size_t size) {
-    auto const* const bytes = static_cast<unsigned char const*>(data);
-    for (std::size_t i = 0; i < size; ++i) value_ = (value_ ^ bytes[i]) * 0x100000001b3U;
-  }
-  std::int64_t value() const { return static_cast<std::int64_t>(value_); }
-
-private:
-  std::uint64_t value_ = 0xcbf29ce484222325U;
-};
+constexpr std::int64_t format_version = 2;
 
 std::int64_t hash_of(std::string_view text) {
-  Hash hash;
-  hash.add(text.data(), text.size());
-  return hash.value();
+  return static_cast<std::int64_t>(Hash().add(text).value());
 }
 
-/// Of all names and values: finds damage that leaves the file's structure whole.
-std::int64_t hash_of(Checkpoint const& checkpoint) {
-  Hash hash;
-  for (auto const& [name, array] : checkpoint.arrays) {
-    hash.add(name.data(), name.size());
-    std::visit(
-        [&](auto const& values) { hash.add(values.data(), values.size() * sizeof(values[0])); },
-        array);
+/// What follows the HDF5 image in the file: HDF5 itself trusts the sizes and addresses that it
+/// reads, and damage there ends in a crash.
+std::string trailer_of(std::string_view image) {
+  return fmt::format("taut{:016x}", Hash().add(image).value());
+}
+
+/// Takes the trailer off. Throws Error if it does not fit.
+std::string checked_image(std::string content) {
+  std::size_t const length = trailer_of({}).size();
+  if (content.size() > length) {
+    std::string const trailer = content.substr(content.size() - length);
+    content.resize(content.size() - length);
+    if (trailer == trailer_of(content)) return content;
   }
-  for (auto const& [name, text] : checkpoint.texts) {
-    hash.add(name.data(), name.size());
-    hash.add(text.data(), text.size());
-  }
-  return hash.value();
+  throw Error("its bytes are not those that were written");
 }
 
 /// The bytes of the checkpoint's file. It is composed in memory because a file that HDF5 writes
@@ -55,7 +42,6 @@ std::string compose(Checkpoint const& checkpoint, std::int64_t scene) {
   };
   write_number("version", format_version);
   write_number("scene", scene);
-  write_number("content", hash_of(checkpoint));
   const Handle arrays = hdf5::make_group(root, "arrays");
   for (auto const& [name, array] : checkpoint.arrays) {
     std::visit(
@@ -72,7 +58,8 @@ std::string compose(Checkpoint const& checkpoint, std::int64_t scene) {
   }
   hdf5::write_strings(root, "text_names", names);
   hdf5::write_strings(root, "texts", texts);
-  return hdf5::image_of(file);
+  std::string image = hdf5::image_of(file);
+  return image + trailer_of(image);
 }
 
 Checkpoint::Array read_array(hid_t parent, std::string const& name) {
@@ -103,9 +90,6 @@ Checkpoint read_all(hid_t root) {
   const std::vector<std::string> texts = hdf5::read_strings(root, "texts");
   if (texts.size() != names.size()) throw Error("its texts and their names differ in number");
   for (std::size_t i = 0; i < names.size(); ++i) checkpoint.texts[names[i]] = texts[i];
-  if (hash_of(checkpoint) != hdf5::read_attribute(root, "content")) {
-    throw Error("its values are not those that were written");
-  }
   return checkpoint;
 }
 
@@ -127,7 +111,8 @@ Checkpoint read_checkpoint(fs::path const& path, std::string_view scene_text) {
   std::int64_t scene = 0;
   Checkpoint checkpoint;
   try {
-    const Handle file = hdf5::open_file(path, H5F_ACC_RDONLY);
+    std::string image = checked_image(read_file(path));
+    const Handle file = hdf5::open_image(image);
     const Handle root = hdf5::open_group(file, "taut");
     version = hdf5::read_attribute(root, "version");
     scene = hdf5::read_attribute(root, "scene");
@@ -144,8 +129,8 @@ Checkpoint read_checkpoint(fs::path const& path, std::string_view scene_text) {
   }
   if (scene != hash_of(scene_text)) {
     throw Error(
-        "{}: this checkpoint was written for a scene that has changed since; undo the "
-        "change or start the run again.",
+        "{}: the scene or options have changed since this checkpoint was written; undo the change "
+        "or start the run again.",
         path.string());
   }
   return checkpoint;

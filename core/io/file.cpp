@@ -91,4 +91,16 @@ void write_file_atomically(fs::path const& path, std::string_view content, Durab
   move_into_place(temporary, path);
 }
 
+void write_file_from(fs::path const& path, std::size_t offset, std::string_view content) {
+  const File file(std::fopen(path.c_str(), "r+b"), &std::fclose);
+  const bool written =
+      file && std::fseek(file.get(), static_cast<long>(offset), SEEK_SET) == 0 &&
+      std::fwrite(content.data(), 1, content.size(), file.get()) == content.size() &&
+      std::fflush(file.get()) == 0;
+  if (!written) {
+    throw Error("{}: cannot be written ({}); free disk space or choose another folder.",
+                path.string(), reason(errno));
+  }
+}
+
 }  // namespace taut

@@ -1,6 +1,7 @@
 // Whole files in and out: the two operations every reader and every small writer is built on.
 #pragma once
 
+#include <cstddef>
 #include <filesystem>
 #include <string>
 #include <string_view>
@@ -17,6 +18,10 @@ enum class Durability { process, machine };
 /// Missing folders are made. Throws Error when it cannot be written; the old file is then intact.
 void write_file_atomically(std::filesystem::path const& path, std::string_view content,
                            Durability durability = Durability::process);
+
+/// Overwrites an existing file from byte `offset` on. Throws Error when it cannot be written.
+void write_file_from(std::filesystem::path const& path, std::size_t offset,
+                     std::string_view content);
 
 /// Makes the folders above `path`. Throws Error naming the folder.
 void make_parent_folder(std::filesystem::path const& path);

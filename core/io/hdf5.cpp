@@ -58,6 +58,8 @@ std::string reason() {
   return text.empty() ? "no reason given" : text;
 }
 
+void leave_files_at_exit() { check(H5dont_atexit(), "HDF5 is in use already"); }
+
 Handle::Handle(hid_t id, Close close, std::string const& what) : id_(id), close_(close) {
   if (id_ < 0) throw Error("{} ({})", what, reason());
 }
@@ -96,6 +98,13 @@ std::string image_of(hid_t file) {
     throw Error("a file in memory cannot be copied ({})", reason());
   }
   return image;
+}
+
+Handle open_image(std::string& image) {
+  const Handle list(H5Pcreate(H5P_FILE_ACCESS), H5Pclose, "HDF5 cannot make a property list");
+  check(H5Pset_fapl_core(list, 1 << 20, false), "HDF5 cannot work in memory");
+  check(H5Pset_file_image(list, image.data(), image.size()), "HDF5 cannot take a file from memory");
+  return {H5Fopen("in memory", H5F_ACC_RDONLY, list), H5Fclose, "it is not an HDF5 file"};
 }
 
 Handle creation_list(hid_t list_class) {
@@ -138,6 +147,22 @@ Shape shape_of(hid_t dataset) {
   Shape shape(static_cast<std::size_t>(std::max(H5Sget_simple_extent_ndims(space), 0)));
   H5Sget_simple_extent_dims(space, shape.data(), nullptr);
   return shape;
+}
+
+hsize_t stored_values(hid_t dataset, std::string const& name) {
+  const Handle type(H5Dget_type(dataset), H5Tclose, name + " has no type");
+  const Handle file(H5Iget_file_id(dataset), H5Fclose, name + " is in no file");
+  hsize_t file_size = 0;
+  check(H5Fget_filesize(file, &file_size), "the file has no size");
+  const hsize_t bytes = std::min(H5Dget_storage_size(dataset), file_size);
+  const hsize_t room = bytes / std::max<hsize_t>(1, H5Tget_size(type));
+  hsize_t values = 1;
+  for (const hsize_t n : shape_of(dataset)) {
+    if (n == 0) return 0;
+    if (values > room / n) throw Error("{} has more values than the file", name);
+    values *= n;
+  }
+  return values;
 }
 
 void write_rows(hid_t dataset, hid_t type, hsize_t first, hsize_t rows, void const* data,
@@ -198,6 +223,7 @@ std::vector<std::string> read_strings(hid_t parent, std::string const& name) {
   if (H5Tget_class(stored) != H5T_STRING || H5Tis_variable_str(stored) || shape.size() != 1) {
     throw Error("{} is no list of strings", name);
   }
+  stored_values(dataset, name);
   const std::size_t length = H5Tget_size(stored);
   const Handle type = string_type(length);
   std::string padded(length * shape[0], '\0');

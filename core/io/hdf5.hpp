@@ -6,7 +6,6 @@
 
 #include <cstdint>
 #include <filesystem>
-#include <numeric>
 #include <span>
 #include <string>
 #include <taut/core/report/error.hpp>
@@ -33,6 +32,10 @@ private:
 
 /// The innermost message of the error stack, or the operating system's if it quotes one.
 std::string reason();
+
+/// For a program, before anything else of HDF5: at its end, files that HDF5 could not close because
+/// their disk is full are left as they are. HDF5 crashes in trying again.
+void leave_files_at_exit();
 
 /// Owns one HDF5 identifier.
 class Handle {
@@ -69,6 +72,8 @@ Handle create_file(std::filesystem::path const& path);
 /// A file that exists in memory only, and its bytes, to be written by other means.
 Handle create_in_memory();
 std::string image_of(hid_t file);
+/// Opens such bytes for reading; HDF5 copies them.
+Handle open_image(std::string& image);
 
 template <class T>
 hid_t memory_type();
@@ -104,6 +109,9 @@ Handle make_dataset(hid_t parent, std::string const& name, hid_t type, Shape con
                     bool reserve_only = false);
 Handle open_dataset(hid_t parent, std::string const& name);
 Shape shape_of(hid_t dataset);
+/// The number of values in a dataset. Throws Error when the file does not hold as many, as in a
+/// damaged one: what follows allocates room for them.
+hsize_t stored_values(hid_t dataset, std::string const& name);
 
 /// Writes or reads rows [first, first + rows) of a one- or two-dimensional dataset.
 void write_rows(hid_t dataset, hid_t type, hsize_t first, hsize_t rows, void const* data,
@@ -128,9 +136,7 @@ void write_dataset(hid_t parent, std::string const& name, std::span<T const> val
 template <class T>
 std::vector<T> read_dataset(hid_t parent, std::string const& name) {
   const Handle dataset = open_dataset(parent, name);
-  const Shape shape = shape_of(dataset);
-  const hsize_t size = std::accumulate(shape.begin(), shape.end(), hsize_t{1}, std::multiplies<>{});
-  std::vector<T> values(size);
+  std::vector<T> values(stored_values(dataset, name));
   check(H5Dread(dataset, memory_type<T>(), H5S_ALL, H5S_ALL, H5P_DEFAULT, values.data()),
         name + " cannot be read");
   return values;

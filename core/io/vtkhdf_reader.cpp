@@ -19,7 +19,9 @@ std::vector<Point> read_points(hid_t dataset, std::int64_t first, std::size_t ro
 /// Throws Error unless `dataset` holds one vector per point and frame.
 void check_shape(hid_t dataset, std::size_t points, std::int64_t frames) {
   const hdf5::Shape shape = hdf5::shape_of(dataset);
-  if (shape.size() != 2 || shape[1] != 3 || shape[0] < points * static_cast<std::size_t>(frames)) {
+  hdf5::stored_values(dataset, "its point data");
+  const std::size_t room = points == 0 ? 0 : shape.at(0) / points;
+  if (shape.size() != 2 || shape[1] != 3 || room < static_cast<std::size_t>(frames)) {
     throw Error("its point data have another size than its steps need");
   }
 }
@@ -29,6 +31,7 @@ ResultMesh read_mesh(hid_t file) {
   const Handle points = hdf5::open_dataset(file, "taut/points");
   const hdf5::Shape shape = hdf5::shape_of(points);
   if (shape.size() != 2 || shape[1] != 3) throw Error("its points are not in three dimensions");
+  hdf5::stored_values(points, "its points");
   result.mesh.points = read_points(points, 0, shape[0]);
   result.object_names = hdf5::read_strings(file, "taut/object_names");
   result.object = hdf5::read_dataset<std::int32_t>(file, "VTKHDF/CellData/object");

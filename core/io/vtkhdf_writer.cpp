@@ -316,8 +316,16 @@ ResultWriter ResultWriter::resume(fs::path const& path, ResultMesh const& mesh, 
   }
   name_errors(path, "the result cannot be continued", [&] {
     file->times_.resize(static_cast<std::size_t>(frames));
-    file->commit();
-    if (capacity > file->shape_.capacity) file->grow(capacity);
+    const std::int64_t room = std::max(capacity, file->shape_.capacity);
+    bool whole = true;
+    try {
+      file->commit();
+    } catch (Error const&) {
+      // A kill can have torn the table that was not in use, if its header lies across two pages:
+      // the frames are moved into a new file.
+      whole = false;
+    }
+    if (!whole || room > file->shape_.capacity) file->grow(room);
   });
   file->sidecar_.restart(file->times_);
   return ResultWriter(std::move(file));

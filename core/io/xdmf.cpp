@@ -6,6 +6,8 @@
 namespace taut {
 namespace {
 
+constexpr char const* closing_tags = "</Grid>\n</Domain></Xdmf>\n";
+
 std::string escaped(std::string const& text) {
   std::string xml;
   for (const char c : text) {
@@ -34,18 +36,23 @@ XdmfSidecar::XdmfSidecar(std::filesystem::path const& path, ResultShape const& s
       shape_(shape) {}
 
 void XdmfSidecar::restart(std::span<double const> times) {
+  std::string text =
+      "<?xml version=\"1.0\"?>\n<Xdmf Version=\"2.0\"><Domain>\n"
+      "<Grid Name=\"result\" GridType=\"Collection\" CollectionType=\"Temporal\">\n";
   frames_ = 0;
-  steps_.clear();
-  for (const double time : times) add(time);
-  write();
+  for (const double time : times) text += grid(frames_++, time);
+  end_ = text.size();
+  write_file_atomically(path_, text + closing_tags);
 }
 
 void XdmfSidecar::append(double time) {
-  add(time);
-  write();
+  const std::string text = grid(frames_, time);
+  write_file_from(path_, end_, text + closing_tags);
+  end_ += text.size();
+  ++frames_;
 }
 
-void XdmfSidecar::add(double time) {
+std::string XdmfSidecar::grid(std::int64_t frame, double time) const {
   const auto capacity = static_cast<std::size_t>(shape_.capacity);
   // VTK's reader takes the first thing inside a DataItem for the name under which it caches the
   // geometry: the comment gives each frame its own.
@@ -55,10 +62,10 @@ void XdmfSidecar::add(double time) {
         "<DataItem Dimensions=\"3 2\" NumberType=\"Int\" Format=\"XML\">{1} 0 1 1 {0} 3</DataItem>"
         "<DataItem Dimensions=\"{2} 3\" NumberType=\"Float\" Precision=\"8\" Format=\"HDF\">"
         "{3}:/VTKHDF/{4}</DataItem></DataItem>",
-        shape_.points, static_cast<std::size_t>(frames_) * shape_.points, capacity * shape_.points,
-        result_, dataset, frames_);
+        shape_.points, static_cast<std::size_t>(frame) * shape_.points, capacity * shape_.points,
+        result_, dataset, frame);
   };
-  steps_ += fmt::format(
+  std::string xml = fmt::format(
       "<Grid Name=\"frame {0}\"><Time Value=\"{1}\"/>\n"
       "<Topology TopologyType=\"Tetrahedron\" NumberOfElements=\"{2}\">"
       "<DataItem Dimensions=\"{3}\" NumberType=\"Int\" Precision=\"8\" Format=\"HDF\">"
@@ -67,22 +74,13 @@ void XdmfSidecar::add(double time) {
       "<Attribute Name=\"object\" Center=\"Cell\">"
       "<DataItem Dimensions=\"{2}\" NumberType=\"Int\" Precision=\"4\" Format=\"HDF\">"
       "{4}:/VTKHDF/CellData/object</DataItem></Attribute>\n",
-      frames_, time, shape_.tets, 4 * shape_.tets, result_, rows("Points"));
+      frame, time, shape_.tets, 4 * shape_.tets, result_, rows("Points"));
   if (shape_.velocities) {
-    steps_ += fmt::format(
+    xml += fmt::format(
         "<Attribute Name=\"velocity\" AttributeType=\"Vector\" Center=\"Node\">{}</Attribute>\n",
         rows("PointData/velocity"));
   }
-  steps_ += "</Grid>\n";
-  ++frames_;
-}
-
-void XdmfSidecar::write() const {
-  write_file_atomically(path_,
-                        fmt::format("<?xml version=\"1.0\"?>\n<Xdmf Version=\"2.0\"><Domain>\n"
-                                    "<Grid Name=\"result\" GridType=\"Collection\" "
-                                    "CollectionType=\"Temporal\">\n{}</Grid>\n</Domain></Xdmf>\n",
-                                    steps_));
+  return xml + "</Grid>\n";
 }
 
 }  // namespace taut

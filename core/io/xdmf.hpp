@@ -25,19 +25,18 @@ public:
 
   /// Starts over with these frames, and writes the sidecar.
   void restart(std::span<double const> times);
-  /// Adds the next frame and replaces the sidecar in one step. Throws Error if it cannot be
-  /// written.
+  /// Adds the next frame, over the closing tags. Throws Error if it cannot be written.
   void append(double time);
 
 private:
-  void add(double time);
-  void write() const;
+  /// The XML of frame number `frame`.
+  std::string grid(std::int64_t frame, double time) const;
 
   std::filesystem::path path_;
   std::string result_;  // file name of the result, seen from the sidecar
   ResultShape shape_;
   std::int64_t frames_ = 0;
-  std::string steps_;  // the XML of all steps so far
+  std::size_t end_ = 0;  // bytes before the closing tags
 };
 
 }  // namespace taut

@@ -110,3 +110,21 @@ TEST_CASE("what the bench does not know is refused", "[bench]") {
   options.precisions = {"fp16"};
   CHECK_THROWS_AS(measure_elastic(options, {1, 1, 1, 1}), Error);
 }
+
+TEST_CASE("options of bench are checked before anything is measured", "[bench]") {
+  auto const refused = [](BenchOptions const& options, std::string const& part) {
+    CHECK_THROWS_WITH(bench_command(options), Catch::Matchers::ContainsSubstring(part));
+  };
+  BenchOptions options;
+  options.materials = {"jelly"};
+  refused(options, "--materials jelly: choose of stable_neo_hookean");
+  options = {};
+  options.precisions = {"fp16"};
+  refused(options, "--precisions fp16: choose of fp32, mixed, fp64");
+  options = {};
+  options.tets = {-5};
+  refused(options, "--tets -5");
+  options = {};
+  options.seconds = 0;
+  refused(options, "--seconds 0");
+}

@@ -169,6 +169,8 @@ TEST_CASE("a sweep says what it took, or that it failed", "[chart]") {
   std::vector<Row> const dk = data.of("DK"), gradient = data.of("gradient");
   CHECK(number(dk[0], "value") == 1e4);
   CHECK(number(dk[1], "value") == 1e8);
+  // One length for all: the motion at the first value.
+  CHECK(data.header.find("length_m = ") == data.header.rfind("length_m = "));
   // Stiffness costs conjugate gradients iterations, and gradient descent its life.
   CHECK(number(dk[0], "iterations") < number(dk[1], "iterations"));
   CHECK(dk[1].at("ended") == "accurate");
@@ -226,6 +228,26 @@ TEST_CASE("bad charts are refused before anything is written", "[chart]") {
     options.methods = {"newton"};
     options.frames = {2, 1};
     refused("--frame 1");
+  }
+  SECTION("numbers that make no sense") {
+    options.methods = {"newton"};
+    options.target = -1;
+    refused("--target -1");
+    options.target = 0.01;
+    options.max_seconds = -1;
+    refused("--seconds -1");
+    options.max_seconds = 1;
+    options.repetitions = 0;
+    refused("--repetitions 0");
+    options.repetitions = 1;
+    options.length = 0;
+    refused("--length 0");
+    CHECK(!std::filesystem::exists(options.out));
+  }
+  SECTION("a folder that cannot be made") {
+    options.methods = {"newton"};
+    options.out = std::filesystem::path(folder.write("file", "")) / "chart";
+    refused("file");
   }
   SECTION("a frame before the first") {
     options.frames = {0};

@@ -1,6 +1,7 @@
 // Every mistake in a scene file is answered by one sentence: where, what, and the mend.
 
 #include <taut/apps/program/scene.hpp>
+#include <taut/apps/program/scene_geometry.hpp>
 #include <taut/core/report/error.hpp>
 
 #include <catch2/matchers/catch_matchers_exception.hpp>
@@ -186,10 +187,27 @@ TEST_CASE("files are looked for beside the scene, then in TAUT_DATA_DIR") {
       MessageMatches(ContainsSubstring("no/such/scene.toml: there is no such file")));
 }
 
-TEST_CASE("a nearly incompressible material is a warning") {
-  auto const warnings = load(replaced(plain_scene, "poisson = 0.4", "poisson = 0.499")).warnings;
+TEST_CASE("a nearly incompressible material is a warning that counts its elements") {
+  std::string const region =
+      "[[object.region]]\nname = \"low\"\nselect = { box = [[-1, -1, -1], [1, 0, 1]] }\n"
+      "material = { poisson = 0.495 }\n\n[[pin]]";
+  auto const warnings = build_geometry(load(replaced(plain_scene, "[[pin]]", region))).warnings;
   REQUIRE(warnings.size() == 1);
-  CHECK_THAT(warnings[0],
-             ContainsSubstring("scene.toml:11: object.cube.material.poisson is 0.499: linear") &&
-                 EndsWith("too little"));
+  CHECK_THAT(warnings[0], ContainsSubstring("80 of 144 tets have a poisson of 0.495: linear") &&
+                              EndsWith("too little"));
+}
+
+TEST_CASE("a material that is unstable at rest is refused, with one that is not") {
+  spoilt("poisson = 0.4", "poisson = 0.1",
+         "poisson is 0.1: stable_neo_hookean has no stable rest state at or below 0.125: use model "
+         "= \"stable_neo_hookean_2018\"");
+  for (char const* model : {"stable_neo_hookean_2018", "neo_hookean", "arap", "fixed_corotated"})
+    load(replaced(plain_scene, "young = 1e5, poisson = 0.4",
+                  fmt::format("model = \"{}\", young = 1e5, poisson = 0", model)));
+}
+
+TEST_CASE("only what is near is suggested") {
+  refused(plain_scene + "[solver]\nmethod = \"simulated_annealing\"",
+          "solver.method is 'simulated_annealing': choose one of dk,");
+  refused(plain_scene + "[solver]\ncolour = 1", "unknown key 'solver.colour': solver knows");
 }

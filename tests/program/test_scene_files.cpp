@@ -76,6 +76,16 @@ TEST_CASE("every scene loads and builds, in full and small") {
     CHECK(names.count(name) == 1);
 }
 
+TEST_CASE("the default scene and its poses cannot end with inverted elements") {
+  for (auto const& file : scene_files()) {
+    if (!file.stem().string().starts_with("drag") || needs_data(file)) continue;
+    INFO(file);
+    std::string const model = load_scene(file).objects.at(0).material.model;
+    for (MaterialModel const& known : material_models())
+      CHECK_FALSE((known.name == model && known.allows_inversion));
+  }
+}
+
 TEST_CASE("no scene tunes the solver") {
   for (auto const& file : scene_files()) {
     std::ifstream stream(file);

@@ -70,7 +70,7 @@ TEST_CASE("a missing, foreign, changed or damaged checkpoint is refused with a s
     write_file_atomically(path, good.substr(0, length));
     check_says(sentence([&] { read_checkpoint(path, "scene"); }), {path.string(), "no checkpoint"});
   }
-  // One bit of one value: HDF5 notices nothing, the hash does.
+  // One bit of one value, which HDF5 would not notice.
   std::string bad = good;
   const std::string value = bytes(std::vector<double>{1e300});
   const std::size_t at = bad.find(value);

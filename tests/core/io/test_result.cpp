@@ -135,6 +135,29 @@ TEST_CASE("a resumed result drops later frames and ends as an uninterrupted one"
   }
 }
 
+TEST_CASE("a step table that a kill has torn does not stop a resumed run") {
+  const Folder folder;
+  const auto path = folder / "result.vtkhdf";
+  {
+    auto writer = ResultWriter::create(path, sample(), 5, ResultWriter::IfExists::refuse);
+    append_frames(writer, 0, 2);
+  }
+  // Two frames have turned the link twice: the table b is not in use.
+  const hid_t file = H5Fopen(path.c_str(), H5F_ACC_RDONLY, H5P_DEFAULT);
+  REQUIRE(file >= 0);
+  H5O_info_t info;
+  REQUIRE(H5Oget_info_by_name(file, "taut/steps_b", &info, H5P_DEFAULT) >= 0);
+  H5Fclose(file);
+  std::string bytes = read_file(path);
+  bytes[info.addr + 20] ^= 0x55;
+  write_file_atomically(path, bytes);
+  {
+    auto writer = ResultWriter::resume(path, sample(), 2, 5);
+    append_frames(writer, 2, 4);
+  }
+  check_frames(path, 4);
+}
+
 TEST_CASE("an existing result is never overwritten unasked") {
   const Folder folder;
   const auto path = folder / "result.vtkhdf";

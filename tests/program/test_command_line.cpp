@@ -1,0 +1,97 @@
+// The command line of the program itself: what it takes, and what it says to what it does not.
+#include <catch2/matchers/catch_matchers_string.hpp>
+
+#include <sys/wait.h>
+
+#include <array>
+#include <cstdio>
+#include <cstdlib>
+
+#include "scene_text.hpp"
+
+using Catch::Matchers::ContainsSubstring;
+using namespace taut;
+
+namespace {
+
+struct Outcome {
+  int status;
+  std::string text;  ///< of stdout and stderr
+};
+
+/// Runs the program, which is built beside the tests.
+Outcome taut_with(std::string const& arguments) {
+  auto const program = std::filesystem::read_symlink("/proc/self/exe").parent_path() / "taut";
+  if (!std::filesystem::exists(program)) SKIP("the program is not built");
+  std::string const command = program.string() + " " + arguments + " 2>&1";
+  std::FILE* pipe = ::popen(command.c_str(), "r");
+  REQUIRE(pipe != nullptr);
+  Outcome outcome{-1, {}};
+  std::array<char, 4096> buffer;
+  for (std::size_t n; (n = std::fread(buffer.data(), 1, buffer.size(), pipe)) > 0;)
+    outcome.text.append(buffer.data(), n);
+  outcome.status = WEXITSTATUS(::pclose(pipe));
+  return outcome;
+}
+
+void says(std::string const& arguments, int status, std::string const& part) {
+  INFO("taut " << arguments);
+  Outcome const outcome = taut_with(arguments);
+  CHECK(outcome.status == status);
+  CHECK_THAT(outcome.text, ContainsSubstring(part));
+}
+
+}  // namespace
+
+TEST_CASE("options do not swallow the scene after them", "[cli]") {
+  test::ScratchFolder const folder;
+  std::string const scene = folder.write("plain.toml", test::plain_scene).string();
+  says("plan --set time.frames=2 --set gravity=[0,0,0] " + scene, 0, "no body force");
+  says("plan " + scene + " --set solver.method=newton --set solver.tolerance=1e-4", 0, "newton");
+  says("chart --methods dk,newtom " + scene, 1, "did you mean \"newton\"?");
+  says("render --frames 0,last " + scene + ".none", 1, "no such result");
+}
+
+TEST_CASE("mistakes are answered by the nearest word, if any is near", "[cli]") {
+  says("rnu drag", 1, "there is no command \"rnu\": did you mean \"run\"?");
+  says("dance", 1, "there is no command \"dance\"; `taut --help`");
+  says("plan dragg", 1, "the nearest is \"drag\"");
+  says("plan elephant", 1, "this name; `taut scenes`");
+}
+
+TEST_CASE("help has the program's name and an example everywhere", "[cli]") {
+  says("--help", 0, "example: taut run");
+  says("--version", 0, "taut 0.");
+  for (std::string const command :
+       {"run", "scenes", "methods", "check", "plan", "chart", "render", "bench", "bench elastic"}) {
+    says(command + " --help", 0, "Usage: taut " + command);
+    says(command + " --help", 0, "example: taut " + command);
+  }
+}
+
+TEST_CASE("scenes go on past a broken file", "[cli]") {
+  test::ScratchFolder const folder;
+  auto const broken = folder.write("broken.toml", "[[=");
+  folder.write("mine.toml", "description = \"a scene of my own\"\n");
+  ::setenv("TAUT_SCENES_DIR", broken.parent_path().c_str(), 1);
+  says("scenes", 1, "a scene of my own");
+  says("scenes", 1, "broken.toml");
+  ::unsetenv("TAUT_SCENES_DIR");
+  says("scenes", 0, "drag_armadillo");
+}
+
+TEST_CASE("methods lists every key with its default, and the materials", "[cli]") {
+  for (char const* part : {"solver.tolerance = 0.001", "solver.safeguard = true", "at most 100",
+                           "stable_neo_hookean_2018", "keeps J > 0"})
+    says("methods", 0, part);
+}
+
+TEST_CASE("plan says what a step ends by", "[cli]") {
+  test::ScratchFolder const folder;
+  std::string const scene = folder.write("plain.toml", test::plain_scene).string();
+  says("plan " + scene, 0, "when the error is estimated to be below");
+  says("plan " + scene + " --set solver.stopping=budget", 0, "whatever the error is then");
+  says("plan " + scene + " --set solver.stopping=energy_drop", 0, "of what the first one did");
+  Outcome const quasi_static = taut_with("plan " + scene + " --set time.integrator=quasi_static");
+  CHECK_THAT(quasi_static.text, !ContainsSubstring("wave") && !ContainsSubstring("m/s"));
+}
