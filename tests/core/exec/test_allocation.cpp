@@ -13,14 +13,14 @@ std::atomic<int> allocations = 0;
 
 }  // namespace
 
-// Of the whole executable.
-void* operator new(std::size_t size) {
+// Of the whole executable. Not inlined, where the compiler would take new and free for mismatched.
+[[gnu::noinline]] void* operator new(std::size_t size) {
   ++allocations;
   if (void* const memory = std::malloc(size)) return memory;
   throw std::bad_alloc();
 }
-void operator delete(void* memory) noexcept { std::free(memory); }
-void operator delete(void* memory, std::size_t) noexcept { std::free(memory); }
+[[gnu::noinline]] void operator delete(void* memory) noexcept { std::free(memory); }
+[[gnu::noinline]] void operator delete(void* memory, std::size_t) noexcept { std::free(memory); }
 
 using namespace taut;
 
