@@ -3,7 +3,7 @@
 #include <sys/wait.h>
 #include <unistd.h>
 
-#include <io/io_samples.hpp>
+#include <core/io/io_samples.hpp>
 #include <random>
 #include <taut/core/io/checkpoint.hpp>
 #include <taut/core/io/file.hpp>
