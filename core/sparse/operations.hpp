@@ -4,7 +4,6 @@
 
 #include <taut/core/sparse/block_csr.hpp>
 
-#include <limits>
 #include <type_traits>
 
 namespace taut {
@@ -50,7 +49,7 @@ struct RowAsymmetry {
     for (int k = a.row_begin(i); k < a.row_begin(i + 1); ++k) {
       int const mirror = a.find(a.column(k), i);
       if (mirror < 0) {
-        largest = std::numeric_limits<double>::infinity();
+        largest = Kokkos::Experimental::infinity_v<double>;
         return;
       }
       Mat3<T> const &b = a.block(k), &c = a.block(mirror);

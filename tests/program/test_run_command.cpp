@@ -9,7 +9,7 @@
 #include <chrono>
 #include <csignal>
 #include <fstream>
-#include <io/io_samples.hpp>
+#include <core/io/io_samples.hpp>
 #include <iterator>
 #include <taut/core/io/vtkhdf.hpp>
 #include <thread>
