@@ -7,9 +7,9 @@
 
 #include <algorithm>
 #include <chrono>
+#include <core/io/io_samples.hpp>
 #include <csignal>
 #include <fstream>
-#include <core/io/io_samples.hpp>
 #include <iterator>
 #include <taut/core/io/vtkhdf.hpp>
 #include <thread>
