@@ -1,26 +1,9 @@
 // Loops and sums allocate nothing after their first use, not even for a name.
+#include <support/heap.hpp>
+
 #include <taut/core/exec/parallel.hpp>
 
 #include <catch2/catch_test_macros.hpp>
-
-#include <atomic>
-#include <cstdlib>
-#include <new>
-
-namespace {
-
-std::atomic<int> allocations = 0;
-
-}  // namespace
-
-// Of the whole executable. Not inlined, where the compiler would take new and free for mismatched.
-[[gnu::noinline]] void* operator new(std::size_t size) {
-  ++allocations;
-  if (void* const memory = std::malloc(size)) return memory;
-  throw std::bad_alloc();
-}
-[[gnu::noinline]] void operator delete(void* memory) noexcept { std::free(memory); }
-[[gnu::noinline]] void operator delete(void* memory, std::size_t) noexcept { std::free(memory); }
 
 using namespace taut;
 
@@ -39,11 +22,11 @@ struct AddUp {
 };
 
 template <class F>
-int allocations_of(F const& f) {
+long allocations_of(F const& f) {
   f();
-  int const before = allocations;
+  long const before = test::heap_allocations;
   f();
-  return allocations - before;
+  return test::heap_allocations - before;
 }
 
 }  // namespace
