@@ -1,5 +1,5 @@
-// No iteration on real elements allocates memory, neither through Kokkos nor, but for
-// the names of its fences, on the heap.
+// No iteration on real elements allocates memory: not through Kokkos, and on the heap nothing but
+// the names of its fences.
 #include "elastic_bar.hpp"
 
 #include <support/heap.hpp>
