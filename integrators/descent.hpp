@@ -270,7 +270,7 @@ private:
   }
 
   void start_travel() {
-    if (!scale_.has_inertia) Kokkos::deep_copy(typename S::execution(), fields_.origin, x_);
+    if (!scale_.has_inertia) Kokkos::deep_copy(S::instance(), fields_.origin, x_);
     lost_energy_ = 0;
   }
   void learn_curvature(double along_p, bool solved) {

@@ -2,9 +2,11 @@
 //   E(x) = 1/2 |x - x~|^2_M + c h^2 V(x),
 // where the rule says x~, c and the new velocity:
 //
-//   implicit Euler  x~ = x + h v                             c = 1    v+ = (x+ - x) / h
-//   BDF2            x~ = a x - b x- + d h (a v - b v-)       c = d^2  v+ = (x+ - a x + b x-) / (d
-//   h) quasi-static    no inertia                               c = 1    v+ = 0
+//   implicit Euler: x~ = x + h v,                        c = 1,    v+ = (x+ - x) / h
+//
+//   BDF2:           x~ = a x - b x- + d h (a v - b v-),  c = d^2,  v+ = (x+ - a x + b x-) / (d h)
+//
+//   quasi-static:   no inertia,                          c = 1,    v+ = 0
 //
 // With r the ratio of this step to the last one, BDF2 has a = (1 + r)^2 / (1 + 2r), b = r^2 / (1 +
 // 2r) and d = (1 + r) / (1 + 2r): 4/3, 1/3 and 2/3 while h does not change.

@@ -31,6 +31,14 @@ private:
   std::filesystem::path path_;
 };
 
+/// The program under test, which is built beside the tests.
+inline std::filesystem::path program() {
+  auto const path = std::filesystem::read_symlink("/proc/self/exe").parent_path() / "taut";
+  INFO("build the target taut_cli");
+  REQUIRE(std::filesystem::exists(path));
+  return path;
+}
+
 inline std::filesystem::path scene_folder() {
   return std::filesystem::path(__FILE__).parent_path() / "../../apps/scenes";
 }

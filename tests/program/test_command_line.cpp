@@ -19,11 +19,8 @@ struct Outcome {
   std::string text;  ///< of stdout and stderr
 };
 
-/// Runs the program, which is built beside the tests.
 Outcome taut_with(std::string const& arguments) {
-  auto const program = std::filesystem::read_symlink("/proc/self/exe").parent_path() / "taut";
-  if (!std::filesystem::exists(program)) SKIP("the program is not built");
-  std::string const command = program.string() + " " + arguments + " 2>&1";
+  std::string const command = test::program().string() + " " + arguments + " 2>&1";
   std::FILE* pipe = ::popen(command.c_str(), "r");
   REQUIRE(pipe != nullptr);
   Outcome outcome{-1, {}};

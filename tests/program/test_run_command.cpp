@@ -14,18 +14,12 @@
 #include <taut/core/io/vtkhdf.hpp>
 #include <thread>
 
+#include "scene_text.hpp"
+
 using namespace taut;
 using namespace taut::test;
 
 namespace {
-
-/// The program under test lies beside this executable.
-std::filesystem::path program() {
-  auto const path = std::filesystem::read_symlink("/proc/self/exe").parent_path() / "taut";
-  INFO("build the target taut_cli");
-  REQUIRE(std::filesystem::exists(path));
-  return path;
-}
 
 /// A process that runs `taut run` on the small drag scene.
 class TautRun {

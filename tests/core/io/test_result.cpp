@@ -32,6 +32,12 @@ void append_frames(ResultWriter& writer, int first, int end) {
   for (int k = first; k < end; ++k) writer.append(k / 60.0, frame(k, 1), frame(k, -1));
 }
 
+/// A result with room for 5 frames.
+void write_result(std::filesystem::path const& path, int frames) {
+  auto writer = ResultWriter::create(path, sample(), 5, ResultWriter::IfExists::refuse);
+  append_frames(writer, 0, frames);
+}
+
 void check_frames(std::filesystem::path const& path, int count) {
   const ResultReader reader(path);
   REQUIRE(reader.frames() == count);
@@ -121,10 +127,7 @@ TEST_CASE("a result grows beyond the frames it was laid out for") {
 TEST_CASE("a resumed result drops later frames and ends as an uninterrupted one") {
   const Folder folder;
   const auto path = folder / "result.vtkhdf";
-  {
-    auto writer = ResultWriter::create(path, sample(), 5, ResultWriter::IfExists::refuse);
-    append_frames(writer, 0, 5);
-  }
+  write_result(path, 5);
   for (const std::int64_t capacity : {5, 9}) {
     {
       auto writer = ResultWriter::resume(path, sample(), 2, capacity);
@@ -139,10 +142,7 @@ TEST_CASE("a resumed result drops later frames and ends as an uninterrupted one"
 TEST_CASE("a step table that a kill has torn does not stop a resumed run") {
   const Folder folder;
   const auto path = folder / "result.vtkhdf";
-  {
-    auto writer = ResultWriter::create(path, sample(), 5, ResultWriter::IfExists::refuse);
-    append_frames(writer, 0, 2);
-  }
+  write_result(path, 2);
   // Two frames have turned the link twice: the table b is not in use.
   const hid_t file = H5Fopen(path.c_str(), H5F_ACC_RDONLY, H5P_DEFAULT);
   REQUIRE(file >= 0);
@@ -152,31 +152,18 @@ TEST_CASE("a step table that a kill has torn does not stop a resumed run") {
   std::string bytes = read_file(path);
   bytes[info.addr + 20] ^= 0x55;
   write_file_atomically(path, bytes);
-  // In a process of its own: HDF5 complains at its end of what it could not open.
-  const pid_t child = ::fork();
-  REQUIRE(child >= 0);
-  if (child == 0) {
-    try {
-      auto writer = ResultWriter::resume(path, sample(), 2, 5);
-      append_frames(writer, 2, 4);
-    } catch (Error const&) {
-      ::_exit(1);
-    }
-    ::_exit(0);
-  }
-  int status = 0;
-  REQUIRE(::waitpid(child, &status, 0) == child);
-  CHECK(status == 0);
+  CHECK(in_own_process([&] {
+          auto writer = ResultWriter::resume(path, sample(), 2, 5);
+          append_frames(writer, 2, 4);
+          return 0;
+        }) == 0);
   check_frames(path, 4);
 }
 
 TEST_CASE("an existing result is never overwritten unasked") {
   const Folder folder;
   const auto path = folder / "result.vtkhdf";
-  {
-    auto writer = ResultWriter::create(path, sample(), 5, ResultWriter::IfExists::refuse);
-    append_frames(writer, 0, 2);
-  }
+  write_result(path, 2);
   check_says(
       sentence([&] { ResultWriter::create(path, sample(), 5, ResultWriter::IfExists::refuse); }),
       {path.string(), "--force"});
