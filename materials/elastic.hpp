@@ -38,6 +38,11 @@ struct Elastic {
   KOKKOS_FORCEINLINE_FUNCTION static State<T> evaluate(Lame<T> const& p, Mat3<T> const& F) {
     return taut::evaluate<Model>(p, F);
   }
+  /// Makes stress and curvature of the state those of a volume `weight`.
+  template <class T>
+  KOKKOS_FORCEINLINE_FUNCTION static void weigh(State<T>& s, T const& weight) {
+    s.d = weight * s.d;
+  }
   /// Psi(F) - Psi(F - dF) without cancellation.
   template <class T>
   KOKKOS_FORCEINLINE_FUNCTION static T change(Lame<T> const& p, State<T> const& s,

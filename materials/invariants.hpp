@@ -35,6 +35,11 @@ struct InvariantDerivatives {
   T d1, d2, d3;
   T d11, d22, d33;
 };
+template <class T>
+KOKKOS_FORCEINLINE_FUNCTION InvariantDerivatives<T> operator*(T const& w,
+                                                              InvariantDerivatives<T> const& d) {
+  return {w * d.d1, w * d.d2, w * d.d3, w * d.d11, w * d.d22, w * d.d33};
+}
 
 /// Which derivatives a model has at all; what is false costs nothing.
 struct InvariantUse {

@@ -56,12 +56,14 @@ struct AtomicGradient {
       }
     }
     T const weight = T(scale) * load<T>(r + 9 * lanes);
-    auto const state = Material::evaluate(Material::cast<T>(lame), edges * B);
-    Mat3<T> const stress = weight * Material::stress(state);
+    auto state = Material::evaluate(Material::cast<T>(lame), edges * B);
+    Material::weigh(state, weight);
+    Mat3<T> const stress = Material::stress(state);
     for (int a = 0; a < 4; ++a) {
       Vec3<T> const b = kernels::shape_gradient(B, a);
-      add(stress * b, v + a * lanes, g);
-      add(weight * Material::diagonal(state, b), v + a * lanes, diagonal);
+      int const* const at = v + (a + 1) % 4 * lanes;
+      add(stress * b, at, g);
+      add(Material::diagonal(state, b), at, diagonal);
     }
   }
   KOKKOS_FUNCTION static void add(Vec3<T> const& what, int const* v,

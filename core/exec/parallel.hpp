@@ -35,29 +35,32 @@ void for_each(char const* name, int n, Functor const& functor) {
                        functor);
 }
 
+/// Kokkos::parallel_reduce into a number on the host, for reductions whose order is free. Into a
+/// view, because into a plain number Kokkos makes a string for the name of its fence each time.
+template <class S, template <class, class> class Join, class T, class Policy, class Functor>
+T reduce(char const* name, Policy const& policy, Functor const& functor) {
+  T result;
+  Kokkos::parallel_reduce(label(name), policy, functor,
+                          Join<T, Kokkos::HostSpace>(Kokkos::View<T, Kokkos::HostSpace>(&result)));
+  S::instance().fence(label(name));
+  return result;
+}
+
 /// Calls `functor(i, largest)` for i in [0, n), where `functor` raises `largest`; returns it, or
 /// `floor` if n = 0. A maximum is exact, so its order is free.
 template <class S, class T, class Functor>
 T maximum(char const* name, int n, T floor, Functor const& functor) {
-  T result = floor;
-  if (n > 0) {
-    Kokkos::parallel_reduce(label(name),
-                            Kokkos::RangePolicy<typename S::execution>(S::instance(), 0, n),
-                            functor, Kokkos::Max<T>(result));
-  }
-  return Kokkos::max(result, floor);
+  if (n == 0) return floor;
+  Kokkos::RangePolicy<typename S::execution> const all(S::instance(), 0, n);
+  return Kokkos::max(reduce<S, Kokkos::Max, T>(name, all, functor), floor);
 }
 
 /// As `maximum`, for the smallest.
 template <class S, class T, class Functor>
 T minimum(char const* name, int n, T ceiling, Functor const& functor) {
-  T result = ceiling;
-  if (n > 0) {
-    Kokkos::parallel_reduce(label(name),
-                            Kokkos::RangePolicy<typename S::execution>(S::instance(), 0, n),
-                            functor, Kokkos::Min<T>(result));
-  }
-  return Kokkos::min(result, ceiling);
+  if (n == 0) return ceiling;
+  Kokkos::RangePolicy<typename S::execution> const all(S::instance(), 0, n);
+  return Kokkos::min(reduce<S, Kokkos::Min, T>(name, all, functor), ceiling);
 }
 
 /// K sums that are accumulated side by side.

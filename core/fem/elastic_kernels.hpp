@@ -3,7 +3,9 @@
 //   gradient   W P(F) b_a                       curvature   W b_a' (d2Psi/dF2) b_a
 //   form       W dF : d2Psi/dF2 : dF            product     W dP(F; dF) b_a
 //
-// where b_1, b_2, b_3 are the rows of B and b_0 = -(b_1 + b_2 + b_3).
+// where b_0, b_1, b_2 are the rows of B and b_3 = -(b_0 + b_1 + b_2): in a patch the corner that
+// edges start from comes last. The loop bodies are inlined by force: called, they would fetch what
+// they capture anew after every store.
 #pragma once
 
 #include <taut/core/fem/patch_sweep.hpp>
@@ -34,6 +36,34 @@ struct GradientSweep : PatchSweep<S, typename Precision::real> {
 
   KOKKOS_FUNCTION int numbers() const { return 3 + static_cast<int>(curvature); }
 
+  /// Hands each corner its gradient and curvature.
+  template <Curvature what>
+  KOKKOS_FORCEINLINE_FUNCTION void scatter(bool to_vertex, typename Base::Elements const& elements,
+                                           int g, Mat3<T> const& B,
+                                           typename Material::template State<T> const& state,
+                                           Real* slots) const {
+    Mat3<T> const P = Material::stress(state);
+    Vec3<T> rest{T(0), T(0), T(0)};
+#pragma GCC unroll 4
+    for (int a = 0; a < 4; ++a) {
+      Vec3<T> const b = shape_gradient(B, a);
+      Vec3<T> const f = a < 3 ? P * b : -rest;
+      rest = rest + f;
+      if constexpr (what == Curvature::none) {
+        this->template give<3>(to_vertex, elements, g, a, {f[0], f[1], f[2]}, slots);
+      } else if constexpr (what == Curvature::diagonal) {
+        Vec3<T> const d = Material::diagonal(state, b);
+        this->template give<6>(to_vertex, elements, g, a, {f[0], f[1], f[2], d[0], d[1], d[2]},
+                               slots);
+      } else {
+        Sym3<T> const h = Material::block(state, b);
+        this->template give<9>(to_vertex, elements, g, a,
+                               {f[0], f[1], f[2], h.s[0], h.s[1], h.s[2], h.s[3], h.s[4], h.s[5]},
+                               slots);
+      }
+    }
+  }
+
   std::size_t scratch_bytes() const {
     auto const& v = this->patches;
     return 2 * ScratchField<S, Real>::shmem_size(std::size_t(4) * v.max_locals) +
@@ -60,33 +90,25 @@ struct GradientSweep : PatchSweep<S, typename Precision::real> {
     bool const to_vertex = this->alone(team);
     team.team_barrier();
     auto const lame = Material::template cast<T>(materials(v.material(patch)));
-    Kokkos::parallel_for(Kokkos::TeamThreadRange(team, this->groups(patch)), [&](int g) {
-      Mat3<T> const B = this->inverse_rest(patch, g);
-      T const weight = T(scale) * this->volume(patch, g);
-      auto const state = Material::evaluate(lame, this->edges(patch, g, local_x) * B);
+    auto const elements = this->elements(patch);
+    auto const body = [&](int g) __attribute__((always_inline)) {
+      Mat3<T> const B = elements.inverse_rest(g);
+      T const weight = T(scale) * elements.volume(g);
+      auto state = Material::evaluate(lame, elements.edges(g, local_x.data()) * B);
       if (after_step) {
-        Mat3<T> const dF = T(alpha) * (this->edges(patch, g, local_p) * B);
+        Mat3<T> const dF = T(alpha) * (elements.apart().edges(g, local_p.data()) * B);
         energies(g) = sum_lanes(T(weight * Material::change(lame, state, dF)));
       }
-      Mat3<T> const P = weight * Material::stress(state);
-      for (int a = 0; a < 4; ++a) {
-        Vec3<T> const b = shape_gradient(B, a);
-        Vec3<T> const f = P * b;
-        if (curvature == Curvature::none) {
-          this->template give<3>(to_vertex, patch, g, a, {f[0], f[1], f[2]}, slots);
-        } else if (curvature == Curvature::diagonal) {
-          Vec3<T> const d = weight * Material::diagonal(state, b);
-          this->template give<6>(to_vertex, patch, g, a, {f[0], f[1], f[2], d[0], d[1], d[2]},
-                                 slots);
-        } else {
-          Sym3<T> h = Material::block(state, b);
-          for (T& entry : h.s) entry = weight * entry;
-          this->template give<9>(to_vertex, patch, g, a,
-                                 {f[0], f[1], f[2], h.s[0], h.s[1], h.s[2], h.s[3], h.s[4], h.s[5]},
-                                 slots);
-        }
+      Material::weigh(state, weight);
+      if (curvature == Curvature::none) {
+        scatter<Curvature::none>(to_vertex, elements.apart(), g, B, state, slots.data());
+      } else if (curvature == Curvature::diagonal) {
+        scatter<Curvature::diagonal>(to_vertex, elements.apart(), g, B, state, slots.data());
+      } else {
+        scatter<Curvature::blocks>(to_vertex, elements.apart(), g, B, state, slots.data());
       }
-    });
+    };
+    Kokkos::parallel_for(Kokkos::TeamThreadRange(team, this->groups(patch)), body);
     team.team_barrier();
     if (curvature == Curvature::none) {
       this->template take<3>(team, patch, slots, output);
@@ -129,16 +151,20 @@ struct ProductSweep : PatchSweep<S, typename Precision::real> {
     bool const to_vertex = this->alone(team);
     team.team_barrier();
     auto const lame = Material::template cast<T>(materials(v.material(patch)));
-    Kokkos::parallel_for(Kokkos::TeamThreadRange(team, this->groups(patch)), [&](int g) {
-      Mat3<T> const B = this->inverse_rest(patch, g);
-      auto const state = Material::evaluate(lame, this->edges(patch, g, local_x) * B);
-      Mat3<T> const dP = (T(scale) * this->volume(patch, g)) *
-                         Material::frame(state).apply(this->edges(patch, g, local_p) * B);
+    auto const elements = this->elements(patch);
+    auto const body = [&](int g) __attribute__((always_inline)) {
+      Mat3<T> const B = elements.inverse_rest(g);
+      auto state = Material::evaluate(lame, elements.edges(g, local_x.data()) * B);
+      Material::weigh(state, T(scale) * elements.volume(g));
+      Mat3<T> const dP = Material::frame(state).apply(elements.edges(g, local_p.data()) * B);
+      Vec3<T> rest{T(0), T(0), T(0)};
       for (int a = 0; a < 4; ++a) {
-        Vec3<T> const f = dP * shape_gradient(B, a);
-        this->template give<3>(to_vertex, patch, g, a, {f[0], f[1], f[2]}, slots);
+        Vec3<T> const f = a < 3 ? dP * shape_gradient(B, a) : -rest;
+        rest = rest + f;
+        this->template give<3>(to_vertex, elements, g, a, {f[0], f[1], f[2]}, slots.data());
       }
-    });
+    };
+    Kokkos::parallel_for(Kokkos::TeamThreadRange(team, this->groups(patch)), body);
     team.team_barrier();
     this->template take<3>(team, patch, slots, output);
   }
@@ -176,14 +202,15 @@ struct MeasureSweep : PatchSweep<S, typename Precision::real> {
     if constexpr (measure != Measure::energy) this->load_relative(team, patch, p, local_p);
     team.team_barrier();
     auto const lame = Material::template cast<T>(materials(v.material(patch)));
-    Kokkos::parallel_for(Kokkos::TeamThreadRange(team, this->groups(patch)), [&](int g) {
-      Mat3<T> const B = this->inverse_rest(patch, g);
-      Mat3<T> F = this->edges(patch, g, local_x) * B;
+    auto const elements = this->elements(patch);
+    auto const body = [&](int g) __attribute__((always_inline)) {
+      Mat3<T> const B = elements.inverse_rest(g);
+      Mat3<T> F = elements.edges(g, local_x.data()) * B;
       T density;
       if constexpr (measure == Measure::energy) {
         density = Material::energy(lame, F);
       } else {
-        Mat3<T> dF = this->edges(patch, g, local_p) * B;
+        Mat3<T> dF = elements.edges(g, local_p.data()) * B;
         if constexpr (measure == Measure::change) {
           dF = T(alpha) * dF;
           F = F + dF;
@@ -192,8 +219,9 @@ struct MeasureSweep : PatchSweep<S, typename Precision::real> {
           density = Material::quadratic(Material::evaluate(lame, F), dF);
         }
       }
-      energies(g) = sum_lanes(T(this->volume(patch, g) * density));
-    });
+      energies(g) = sum_lanes(T(elements.volume(g) * density));
+    };
+    Kokkos::parallel_for(Kokkos::TeamThreadRange(team, this->groups(patch)), body);
     team.team_barrier();
     this->add_up(team, patch, energies, total);
   }
@@ -242,7 +270,7 @@ struct AssembleColour {
       Mat3<double> B, D;
       for (int k = 0; k < 9; ++k) B.a[k] = double(rest[k * lanes]);
       for (int j = 0; j < 3; ++j)
-        for (int i = 0; i < 3; ++i) D(i, j) = double(x(v[j + 1], i)) - double(x(v[0], i));
+        for (int i = 0; i < 3; ++i) D(i, j) = double(x(v[j], i)) - double(x(v[3], i));
       auto const frame = Material::frame(Material::evaluate(lame, D * B));
       Vec3<double> beta[4];
       for (int a = 0; a < 4; ++a) beta[a] = transpose_times(frame.V, shape_gradient(B, a));

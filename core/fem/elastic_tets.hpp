@@ -181,15 +181,13 @@ private:
     if (patches_.count == 0) return at_most;
     using Certificate = kernels::CertificateSweep<Space, Precision>;
     Certificate const certificate{{patches_}, x, p, certified_};
-    double smallest = at_most;
-    Kokkos::parallel_reduce(label("elastic_certificate"), policy(certificate.scratch_bytes()),
-                            certificate, Kokkos::Min<double>(smallest));
-    if (smallest >= at_most) return at_most;
-    smallest = at_most;
-    Kokkos::parallel_reduce(
-        label("elastic_max_step"), policy(0),
-        kernels::InversionSweep<Space, Precision>{patches_, x, p, certified_, at_most, strict},
-        Kokkos::Min<double>(smallest));
+    if (reduce<Space, Kokkos::Min, double>(
+            "elastic_certificate", policy(certificate.scratch_bytes()), certificate) >= at_most) {
+      return at_most;
+    }
+    using Inversion = kernels::InversionSweep<Space, Precision>;
+    double const smallest = reduce<Space, Kokkos::Min, double>(
+        "elastic_max_step", policy(0), Inversion{patches_, x, p, certified_, at_most, strict});
     // Kokkos' identity of the minimum is the largest finite number.
     return smallest < std::numeric_limits<double>::max() ? std::min(smallest, at_most) : at_most;
   }

@@ -52,13 +52,14 @@ struct CertificateSweep : PatchSweep<S, typename Precision::real> {
     constexpr Real eps = Kokkos::Experimental::epsilon_v<Real>;
     T const flat(64 * eps * largest(team, patch, local_x));
     T const shaky(8 * eps * largest(team, patch, local_p));
+    auto const elements = this->elements(patch);
     Real best = Kokkos::Experimental::finite_max_v<Real>;
     Kokkos::parallel_reduce(
         Kokkos::TeamThreadRange(team, this->groups(patch)),
-        [&](int g, Real& least) {
-          Mat3<T> const B = this->inverse_rest(patch, g);
-          Mat3<T> const F = this->edges(patch, g, local_x) * B;
-          Mat3<T> const dF = this->edges(patch, g, local_p) * B;
+        [&](int g, Real& least) __attribute__((always_inline)) {
+          Mat3<T> const B = elements.inverse_rest(g);
+          Mat3<T> const F = elements.edges(g, local_x.data()) * B;
+          Mat3<T> const dF = elements.edges(g, local_p.data()) * B;
           Mat3<T> const C = cofactor(F), G = transpose_times(C, dF);
           T const J = dot(F.column(0), C.column(0)), I2 = contract(F, F);
           T const norm_B = sqrt(contract(B, B)), norm_C = sqrt(contract(C, C));
@@ -103,8 +104,8 @@ struct InversionSweep {
     Mat3<double> D, d;
     double motion = 0;
     for (int a = 0; a < 3; ++a) {
-      D.set_column(a, edge(x, v[0], v[a + 1]));
-      d.set_column(a, edge(p, v[0], v[a + 1]));
+      D.set_column(a, edge(x, v[3], v[a]));
+      d.set_column(a, edge(p, v[3], v[a]));
       motion += dot(d.column(a), d.column(a));
     }
     constexpr double infinity = Kokkos::Experimental::infinity_v<double>;

@@ -61,39 +61,59 @@ struct PatchSweep {
   template <class Team, class Field>
   KOKKOS_FORCEINLINE_FUNCTION void load_relative(Team const& team, int patch, Field const& field,
                                                  ScratchField<S, Real> const& to) const {
-    int const first = patches.local_begin(patch);
-    int const origin = patches.vertex(first);
-    Kokkos::parallel_for(Kokkos::TeamThreadRange(team, locals(patch)), [&](int l) {
-      int const v = patches.vertex(first + l);
-      for (int c = 0; c < 3; ++c) {
-        to(4 * l + c) = static_cast<Real>(field(v, c) - field(origin, c));
-      }
-      to(4 * l + 3) = 0;
-    });
+    int const* const vertex = patches.vertex.data() + patches.local_begin(patch);
+    Real* const row = to.data();
+    typename Field::non_const_value_type origin[3];
+    for (int c = 0; c < 3; ++c) origin[c] = field(*vertex, c);
+    auto const body = [&](int l) __attribute__((always_inline)) {
+      int const v = vertex[l];
+      for (int c = 0; c < 3; ++c) row[4 * l + c] = static_cast<Real>(field(v, c) - origin[c]);
+      row[4 * l + 3] = 0;
+    };
+    Kokkos::parallel_for(Kokkos::TeamThreadRange(team, locals(patch)), body);
   }
 
-  /// Edge matrix of group `g`: differences to its first corner.
-  KOKKOS_FORCEINLINE_FUNCTION Mat3<Value> edges(int patch, int g,
-                                                ScratchField<S, Real> const& field) const {
-    std::uint16_t const* corner = corners(patch, g);
-    Mat3<Value> d;
-    Value origin[3], end[3];
-    load_rows(field.data(), corner, origin);
-    for (int a = 1; a < 4; ++a) {
-      load_rows(field.data(), corner + a * lanes, end);
-      for (int c = 0; c < 3; ++c) d(c, a - 1) = end[c] - origin[c];
+  /// The elements of one patch behind plain pointers, which stay in registers through the stores of
+  /// a sweep.
+  struct Elements {
+    std::uint16_t const* corner;
+    Real const* rest;
+
+    /// The same elements, unrelated for the compiler: it would rather keep the addresses of 32 rows
+    /// on the stack than compute them anew for the next field.
+    KOKKOS_FORCEINLINE_FUNCTION Elements apart() const {
+      Elements other = *this;
+#if !defined(__CUDA_ARCH__)
+      asm("" : "+r"(other.corner));
+#endif
+      return other;
     }
-    return d;
-  }
-
-  KOKKOS_FORCEINLINE_FUNCTION Mat3<Value> inverse_rest(int patch, int g) const {
-    Real const* from = rest(patch, g);
-    auto const entry = [&](int k) { return load<Value>(from + k * lanes); };
-    return {
-        {entry(0), entry(1), entry(2), entry(3), entry(4), entry(5), entry(6), entry(7), entry(8)}};
-  }
-  KOKKOS_FORCEINLINE_FUNCTION Value volume(int patch, int g) const {
-    return load<Value>(rest(patch, g) + 9 * lanes);
+    KOKKOS_FORCEINLINE_FUNCTION std::uint16_t const* corners(int g) const {
+      return corner + g / per_pack * 4 * lanes + g % per_pack * width;
+    }
+    /// Edge matrix of group `g`: differences to the corner in the last place.
+    KOKKOS_FORCEINLINE_FUNCTION Mat3<Value> edges(int g, Real const* field) const {
+      Mat3<Value> d;
+      Value origin[3], end[3];
+      load_rows(field, corners(g) + 3 * lanes, origin);
+      for (int a = 0; a < 3; ++a) {
+        load_rows(field, corners(g) + a * lanes, end);
+        for (int c = 0; c < 3; ++c) d(c, a) = end[c] - origin[c];
+      }
+      return d;
+    }
+    KOKKOS_FORCEINLINE_FUNCTION Value shape(int g, int k) const {
+      return load<Value>(rest + (g / per_pack * 10 + k) * lanes + g % per_pack * width);
+    }
+    KOKKOS_FORCEINLINE_FUNCTION Mat3<Value> inverse_rest(int g) const {
+      return {{shape(g, 0), shape(g, 1), shape(g, 2), shape(g, 3), shape(g, 4), shape(g, 5),
+               shape(g, 6), shape(g, 7), shape(g, 8)}};
+    }
+    KOKKOS_FORCEINLINE_FUNCTION Value volume(int g) const { return shape(g, 9); }
+  };
+  KOKKOS_FORCEINLINE_FUNCTION Elements elements(int patch) const {
+    std::size_t const pack = patches.pack_begin(patch);
+    return {patches.corner.data() + pack * 4 * lanes, patches.rest.data() + pack * 10 * lanes};
   }
 
   /// Whether one thread does the whole patch: then it adds to the vertices as it goes, which needs
@@ -113,16 +133,15 @@ struct PatchSweep {
     if (!alone(team)) return;
     for (int k = 0; k < padded(numbers) * locals(patch); ++k) slots(k) = 0;
   }
-  /// Hands over what corner `a` of group g receives.
+  /// Hands over what the corner in place `a` of group g receives.
   template <int numbers>
-  KOKKOS_FORCEINLINE_FUNCTION void give(bool to_vertex, int patch, int g, int a,
-                                        Value const (&received)[numbers],
-                                        ScratchField<S, Real> const& slots) const {
+  KOKKOS_FORCEINLINE_FUNCTION void give(bool to_vertex, Elements const& elements, int g, int a,
+                                        Value const (&received)[numbers], Real* slots) const {
     if (S::on_host && to_vertex) {
-      add_rows<numbers, padded(numbers) / 4>(received, slots.data(), corners(patch, g) + a * lanes);
+      add_rows<numbers, padded(numbers) / 4>(received, slots, elements.corners(g) + a * lanes);
     } else {
       // [number][pack][corner][lane]
-      Real* const slot = slots.data() + (g / per_pack * 4 + a) * lanes + g % per_pack * width;
+      Real* const slot = slots + (g / per_pack * 4 + a) * lanes + g % per_pack * width;
       for (int c = 0; c < numbers; ++c) store(received[c], slot + c * stride());
     }
   }
@@ -132,25 +151,29 @@ struct PatchSweep {
                                         ScratchField<S, Real> const& slots,
                                         SweepOutput<S, Real> const& output) const {
     int const first = patches.local_begin(patch), step = stride();
+    int const* const vertex = patches.vertex.data() + first;
+    int const* const row = patches.row.data() + first;
+    int const* const begin = patches.incidence_begin.data() + first;
+    std::uint16_t const* const incidence = patches.incidence.data();
+    Real const* const slot = slots.data();
+    Real* const partial = output.partial.data();
     bool const added = alone(team);
-    Kokkos::parallel_for(Kokkos::TeamThreadRange(team, locals(patch)), [&](int l) {
+    auto const body = [&](int l) __attribute__((always_inline)) {
       Real sum[numbers] = {};
       if (added) {
-        for (int c = 0; c < numbers; ++c) sum[c] = slots(padded(numbers) * l + c);
+        for (int c = 0; c < numbers; ++c) sum[c] = slot[padded(numbers) * l + c];
       } else {
-        int const last = patches.incidence_begin(first + l + 1);
-        for (int k = patches.incidence_begin(first + l); k < last; ++k) {
-          Real const* from = slots.data() + patches.incidence(k);
-          for (int c = 0; c < numbers; ++c) sum[c] += from[c * step];
+        for (int k = begin[l]; k < begin[l + 1]; ++k) {
+          for (int c = 0; c < numbers; ++c) sum[c] += slot[incidence[k] + c * step];
         }
       }
-      int const row = patches.row(first + l);
-      if (row >= 0) {
-        for (int c = 0; c < numbers; ++c) output.partial(numbers * row + c) = sum[c];
+      if (row[l] >= 0) {
+        for (int c = 0; c < numbers; ++c) partial[std::size_t(numbers) * row[l] + c] = sum[c];
       } else {
-        output.template add<numbers>(patches.vertex(first + l), sum);
+        output.template add<numbers>(vertex[l], sum);
       }
-    });
+    };
+    Kokkos::parallel_for(Kokkos::TeamThreadRange(team, locals(patch)), body);
   }
 
   /// Adds up one number per group, in order, into the patch's entry of `total`.
@@ -172,21 +195,13 @@ private:
   /// Distance between two numbers of a slot: one slot per corner, and an odd number of cache lines
   /// so that the numbers of one slot do not fall into the same cache set.
   KOKKOS_FORCEINLINE_FUNCTION int stride() const { return patches.max_packs * 4 * lanes + 16; }
-  KOKKOS_FORCEINLINE_FUNCTION std::uint16_t const* corners(int patch, int g) const {
-    return patches.corner.data() +
-           std::size_t(patches.pack_begin(patch) + g / per_pack) * 4 * lanes + g % per_pack * width;
-  }
-  KOKKOS_FORCEINLINE_FUNCTION Real const* rest(int patch, int g) const {
-    return patches.rest.data() +
-           std::size_t(patches.pack_begin(patch) + g / per_pack) * 10 * lanes +
-           g % per_pack * width;
-  }
 };
 
-/// Row a of B (a = 1, 2, 3) or minus their sum (a = 0): the gradient of shape function a.
+/// Row a of B (a = 0, 1, 2) or minus their sum (a = 3): the gradient of the shape function of the
+/// corner in place a.
 template <class T>
 KOKKOS_FORCEINLINE_FUNCTION Vec3<T> shape_gradient(Mat3<T> const& B, int a) {
-  if (a > 0) return {B(a - 1, 0), B(a - 1, 1), B(a - 1, 2)};
+  if (a < 3) return {B(a, 0), B(a, 1), B(a, 2)};
   Vec3<T> b;
   for (int c = 0; c < 3; ++c) b[c] = -(B(0, c) + B(1, c) + B(2, c));
   return b;

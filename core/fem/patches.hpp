@@ -21,6 +21,7 @@ namespace taut {
 
 /// The patches of a list of tets, on the host. A patch of n packs gives lane l of its pack k the
 /// tet l n + k; where there is none, a copy of the last one, which has no weight and no incidence.
+/// The corners of a tet take the places 3, 0, 1, 2: those that have a row of B come first.
 struct Patches {
   int lanes = 1;                          ///< elements per pack
   std::vector<int> pack_begin;            ///< per patch, +1: its packs
@@ -29,9 +30,9 @@ struct Patches {
   std::vector<int> vertex;                ///< per local vertex: vertex of the mesh
   std::vector<int> tet;                   ///< per element: index into the list
   std::vector<char> padding;              ///< per element: 1 for a padding copy
-  std::vector<std::uint16_t> corner;      ///< [pack][corner][lane]: 4 x local vertex in its patch
+  std::vector<std::uint16_t> corner;      ///< [pack][place][lane]: 4 x local vertex in its patch
   std::vector<int> incidence_begin;       ///< per local vertex, +1
-  std::vector<std::uint16_t> incidence;   ///< slot (pack within patch * 4 + corner) * lanes + lane
+  std::vector<std::uint16_t> incidence;   ///< slot (pack within patch * 4 + place) * lanes + lane
   std::vector<int> occurrence_begin;      ///< per vertex of the mesh, +1
   std::vector<int> occurrence;            ///< its local vertices, ascending
   std::vector<int> shared;                ///< vertices that several patches have

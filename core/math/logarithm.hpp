@@ -10,6 +10,9 @@
 
 #include <taut/core/math/scalar.hpp>
 
+#include <bit>
+#include <type_traits>
+
 namespace taut {
 namespace kernels {
 
@@ -34,26 +37,56 @@ struct FloatFormat<double> {
   static constexpr double ln2_head = 0x1.62e42feep-1, ln2_tail = 0x1.a39ef35793c76p-33;
 };
 
-/// Splits normal positive numbers, count after count: x = 2^exponent mantissa. The integers stay
-/// unsigned, with shifts to the right that are logical, for the loop over lanes to vectorise.
-template <int count, class Real>
-KOKKOS_FORCEINLINE_FUNCTION void split_exponents(Real const* x, Real* mantissa, Real* exponent) {
+/// Splits a normal positive number, x = 2^exponent mantissa, given and returned as bits. `Bits` may
+/// be a register of unsigned integers; shifts to the right are logical.
+template <class Real, class Bits>
+struct SplitBits {
+  Bits mantissa;
+  Bits exponent;  ///< of exponent + exponent_offset
+};
+template <class Real>
+inline constexpr Real exponent_offset = static_cast<Real>((typename FloatFormat<Real>::Bits(1)
+                                                           << FloatFormat<Real>::mantissa_bits) +
+                                                          FloatFormat<Real>::bias);
+
+template <class Real, class Bits>
+KOKKOS_FORCEINLINE_FUNCTION SplitBits<Real, Bits> split_exponent(Bits const& x) {
   using Format = FloatFormat<Real>;
-  using Bits = typename Format::Bits;
-  constexpr Bits one = static_cast<Bits>(Format::bias) << Format::mantissa_bits;
-  constexpr Bits mask = (Bits(1) << Format::mantissa_bits) - 1;
+  using Word = typename Format::Bits;
+  constexpr Word one = static_cast<Word>(Format::bias) << Format::mantissa_bits;
+  constexpr Word mask = (Word(1) << Format::mantissa_bits) - 1;
   // Below 2^(mantissa_bits + 1), the bits of 2^mantissa_bits + k are those of 2^mantissa_bits, plus
   // k.
-  constexpr Bits integers = static_cast<Bits>(Format::bias + Format::mantissa_bits)
+  constexpr Word integers = static_cast<Word>(Format::bias + Format::mantissa_bits)
                             << Format::mantissa_bits;
-  constexpr Real offset = static_cast<Real>((Bits(1) << Format::mantissa_bits) + Format::bias);
-  for (int i = 0; i < count; ++i) {
-    Bits const shifted = Kokkos::bit_cast<Bits>(x[i]) + (one - Format::sqrt_half);
-    exponent[i] =
-        Kokkos::bit_cast<Real>(static_cast<Bits>((shifted >> Format::mantissa_bits) | integers)) -
-        offset;
-    mantissa[i] = Kokkos::bit_cast<Real>(static_cast<Bits>((shifted & mask) + Format::sqrt_half));
+  Bits const shifted = x + (one - Format::sqrt_half);
+  return {(shifted & mask) + Format::sqrt_half, (shifted >> Format::mantissa_bits) | integers};
+}
+
+/// The same for the lanes of a pack: mantissas, and exponents as numbers.
+template <class T>
+KOKKOS_FORCEINLINE_FUNCTION void split_exponents(T const& x, T& mantissa, T& exponent) {
+  using Real = ValueType<T>;
+  using Word = typename FloatFormat<Real>::Bits;
+  constexpr int lanes = ScalarTraits<T>::lanes;
+#if defined(__GNUC__) && !defined(__CUDACC__)
+  if constexpr (sizeof(T) == lanes * sizeof(Real) && std::is_trivially_copyable_v<T>) {
+    // In registers: through memory, the compiler would take the logarithm of one number twice.
+    typedef Word Register __attribute__((vector_size(sizeof(T))));
+    auto const split = split_exponent<Real>(std::bit_cast<Register>(x));
+    mantissa = std::bit_cast<T>(split.mantissa);
+    exponent = std::bit_cast<T>(split.exponent) - T(exponent_offset<Real>);
+    return;
   }
+#endif
+  Real m[lanes], e[lanes];
+  for (int i = 0; i < lanes; ++i) {
+    auto const split = split_exponent<Real>(Kokkos::bit_cast<Word>(lane(x, i)));
+    m[i] = Kokkos::bit_cast<Real>(split.mantissa);
+    e[i] = Kokkos::bit_cast<Real>(split.exponent) - exponent_offset<Real>;
+  }
+  mantissa = load<T>(m);
+  exponent = load<T>(e);
 }
 
 }  // namespace kernels
@@ -74,7 +107,6 @@ requires std::is_floating_point_v<Real> KOKKOS_FORCEINLINE_FUNCTION
     log(Kokkos::Experimental::basic_simd<Real, Abi> const& x) {
   using T = Kokkos::Experimental::basic_simd<Real, Abi>;
   using Format = kernels::FloatFormat<Real>;
-  constexpr int lanes = ScalarTraits<T>::lanes;
   constexpr Real infinity = Kokkos::Experimental::infinity_v<Real>;
   constexpr Real nan = Kokkos::Experimental::quiet_NaN_v<Real>;
   // Subnormal numbers are scaled up first.
@@ -82,11 +114,10 @@ requires std::is_floating_point_v<Real> KOKKOS_FORCEINLINE_FUNCTION
       static_cast<Real>(typename Format::Bits(1) << Format::mantissa_bits);
   auto const subnormal = x < T(Kokkos::Experimental::norm_min_v<Real>);
 
-  Real in[lanes], mantissa[lanes], exponent[lanes];
-  store(select(subnormal, x * T(two_to_mantissa), x), in);
-  kernels::split_exponents<lanes>(in, mantissa, exponent);
-  T const f = load<T>(mantissa) - T(1);
-  T const k = load<T>(exponent) - select(subnormal, T(Real(Format::mantissa_bits)), T(0));
+  T mantissa, exponent;
+  kernels::split_exponents(select(subnormal, x * T(two_to_mantissa), x), mantissa, exponent);
+  T const f = mantissa - T(1);
+  T const k = exponent - select(subnormal, T(Real(Format::mantissa_bits)), T(0));
 
   T const s = f / (T(2) + f), z = s * s;
   T series(Real(1) / (2 * Format::terms + 1));

@@ -146,7 +146,7 @@ KOKKOS_FORCEINLINE_FUNCTION void add_quads(T const* row, ValueType<T>* to, Index
 /// Adds rows of five to eight numbers of eight lanes, a whole register at a time: half the loads
 /// and stores of two quads.
 template <int numbers, int scale, class T, class Index>
-void add_octets(T const* row, ValueType<T>* to, Index const* begin) {
+KOKKOS_FORCEINLINE_FUNCTION void add_octets(T const* row, ValueType<T>* to, Index const* begin) {
   using Registers = QuadsOf<T>;
   using Vector = typename Registers::Vector;
   Vector a[4], b[4] = {};

@@ -58,18 +58,6 @@ struct PackOf<Real, 1> {
 template <class Real>
 using HostPack = typename PackOf<Real, host_lanes<Real>>::type;
 
-#if defined(__GNUC__) && !defined(__CUDACC__)
-namespace kernels {
-template <class T>
-struct Register {
-  typedef ValueType<T> type __attribute__((vector_size(sizeof(T))));
-};
-/// A pack as the compiler's own vector, for what Kokkos does not offer.
-template <class T>
-using RegisterOf = typename Register<T>::type;
-}  // namespace kernels
-#endif
-
 template <class T>
 requires std::is_arithmetic_v<T> KOKKOS_FORCEINLINE_FUNCTION T select(bool mask, T a, T b) {
   return mask ? a : b;
@@ -86,12 +74,9 @@ KOKKOS_FORCEINLINE_FUNCTION Kokkos::Experimental::basic_simd<T, Abi> select(
 /// The smaller; a where either is not a number.
 template <class T>
 KOKKOS_FORCEINLINE_FUNCTION T min(T const& a, T const& b) {
-#if defined(__GNUC__) && !defined(__CUDACC__)
-  if constexpr (is_pack<T>) {  // one instruction, where a mask takes five
-    using Vector = kernels::RegisterOf<T>;
-    Vector const u = std::bit_cast<Vector>(a), v = std::bit_cast<Vector>(b);
-    return std::bit_cast<T>(v < u ? v : u);
-  }
+#if defined(__AVX2__) && !defined(__CUDACC__)
+  // One instruction, which yields its second operand where one is not a number.
+  if constexpr (is_pack<T>) return Kokkos::min(b, a);
 #endif
   return select(b < a, b, a);
 }
@@ -99,12 +84,8 @@ KOKKOS_FORCEINLINE_FUNCTION T min(T const& a, T const& b) {
 /// The larger; a where either is not a number.
 template <class T>
 KOKKOS_FORCEINLINE_FUNCTION T max(T const& a, T const& b) {
-#if defined(__GNUC__) && !defined(__CUDACC__)
-  if constexpr (is_pack<T>) {
-    using Vector = kernels::RegisterOf<T>;
-    Vector const u = std::bit_cast<Vector>(a), v = std::bit_cast<Vector>(b);
-    return std::bit_cast<T>(u < v ? v : u);
-  }
+#if defined(__AVX2__) && !defined(__CUDACC__)
+  if constexpr (is_pack<T>) return Kokkos::max(b, a);
 #endif
   return select(a < b, b, a);
 }
