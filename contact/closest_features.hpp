@@ -12,7 +12,7 @@
 // distance. If its answer lies inside, it is the closest pair; if not, some end or edge is, and the
 // nearest of all projections on edges is taken.
 //
-// Error of the distance: at most 8 epsilon (|b| + |e1| + |e2|), for any pair, degenerate or not,
+// Error of the distance: at most 4 epsilon (|b| + |e1| + |e2|), for any pair, degenerate or not,
 // whose size is within 1e-10 and 1e15 (fp32) or 1e-100 and 1e150 (fp64). Only differences of
 // vertices are used, so coordinates far from the origin cost no more than their own rounding.
 #pragma once

@@ -94,8 +94,8 @@ TEMPLATE_TEST_CASE("closest points are as close as a search finds, for every kin
       }
     }
     INFO(family.name);
-    CHECK(worst_distance < 8);
-    CHECK(worst_point < 8);
+    CHECK(worst_distance < 4);
+    CHECK(worst_point < 4);
     CHECK(worst_sum <= 1);
     CHECK(outside == 0);
     CHECK(wrong_features == 0);
