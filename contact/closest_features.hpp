@@ -23,6 +23,8 @@
 
 namespace taut {
 
+enum class PairKind : std::uint8_t { point_triangle, edge_edge };
+
 /// Where the closest points lie: the Voronoi region of a pair.
 enum class Feature : std::uint8_t {
   face,  ///< of the triangle: its interior, the interior of an edge, a vertex
@@ -173,6 +175,12 @@ KOKKOS_INLINE_FUNCTION ClosestPoints<T> closest_edge_edge(Vec3<T> const (&y)[4])
     r.feature = static_cast<Feature>(static_cast<int>(Feature::a0_b0) + 2 * end_of_a + end_of_b);
   }
   return r;
+}
+
+/// Of either kind.
+template <class T>
+KOKKOS_INLINE_FUNCTION ClosestPoints<T> closest_points(PairKind kind, Vec3<T> const (&y)[4]) {
+  return kind == PairKind::edge_edge ? closest_edge_edge(y) : closest_point_triangle(y);
 }
 
 }  // namespace taut

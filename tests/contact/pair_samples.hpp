@@ -47,19 +47,15 @@ std::vector<Family> families();
 
 /// The distance by golden-section search in long double: over the lines of the triangle parallel to
 /// one edge, or over the points of one edge, of the distance to a segment, which is convex.
-long double searched_point_triangle(Vec3<long double> const (&y)[4]);
-long double searched_edge_edge(Vec3<long double> const (&y)[4]);
+long double searched_distance(PairKind kind, Vec3<long double> const (&y)[4]);
 
 /// A point and triangle, or two edges, with edges of 0.5 to 1.5 times `size`, whose closest points
 /// lie well inside the given feature, `gap` apart.
 Corners corners_of(Random& random, Feature feature, double gap, double size);
 
 inline constexpr int features = 16;
-inline bool of_triangle(Feature f) { return f <= Feature::vertex_2; }
-
-template <class T>
-ClosestPoints<T> closest_points(bool triangle, Vec3<T> const (&y)[4]) {
-  return triangle ? closest_point_triangle(y) : closest_edge_edge(y);
+inline PairKind kind_of(Feature f) {
+  return f <= Feature::vertex_2 ? PairKind::point_triangle : PairKind::edge_edge;
 }
 
 template <class To, class From>

@@ -31,9 +31,10 @@ struct Pair {
     }
   }
   /// |b| + |e1| + |e2|
-  long double size(bool triangle) const {
-    return triangle ? norm(wide[0] - wide[1]) + norm(wide[2] - wide[1]) + norm(wide[3] - wide[1])
-                    : norm(wide[0] - wide[2]) + norm(wide[1] - wide[0]) + norm(wide[3] - wide[2]);
+  long double size(PairKind kind) const {
+    return kind == PairKind::point_triangle
+               ? norm(wide[0] - wide[1]) + norm(wide[2] - wide[1]) + norm(wide[3] - wide[1])
+               : norm(wide[0] - wide[2]) + norm(wide[1] - wide[0]) + norm(wide[3] - wide[2]);
   }
   Vec3<long double> at(T const (&c)[4]) const {  // Sum_a c_a y_a in differences, as Sum_a c_a = 0
     Vec3<long double> t{};
@@ -66,11 +67,10 @@ TEMPLATE_TEST_CASE("closest points are as close as a search finds, for every kin
     Random random(std::hash<std::string>{}(family.name));
     for (int k = 0; k < per_family; ++k) {
       Pair<T> const pair(family.draw(random));
-      for (bool const triangle : {true, false}) {
-        auto const found = closest_points(triangle, pair.y);
-        long double const unit = epsilon * pair.size(triangle);
-        long double const expected =
-            triangle ? searched_point_triangle(pair.wide) : searched_edge_edge(pair.wide);
+      for (PairKind const kind : {PairKind::point_triangle, PairKind::edge_edge}) {
+        auto const found = closest_points(kind, pair.y);
+        long double const unit = epsilon * pair.size(kind);
+        long double const expected = searched_distance(kind, pair.wide);
         if (unit > 0) {
           // A NaN fails these comparisons.
           auto const raise = [&](long double& worst, long double error) {
@@ -84,12 +84,12 @@ TEMPLATE_TEST_CASE("closest points are as close as a search finds, for every kin
         long double sum = 0;
         for (int a = 0; a < 4; ++a) {
           sum += found.c[a];
-          bool const first = triangle ? a < 1 : a < 2;
+          bool const first = a == 0 || (a == 1 && kind == PairKind::edge_edge);
           T const share = first ? found.c[a] : -found.c[a];
           if (!(share >= 0 && share <= 1)) ++outside;
           if ((found.c[a] != 0) != touches(found.feature, a)) ++wrong_features;
         }
-        if (of_triangle(found.feature) != triangle) ++wrong_features;
+        if (kind_of(found.feature) != kind) ++wrong_features;
         worst_sum = std::max(worst_sum, std::abs(sum) / epsilon);
       }
     }
@@ -109,7 +109,7 @@ TEMPLATE_TEST_CASE("a pair made with a feature is found to have it", "[contact]"
     auto const feature = static_cast<Feature>(k % features);
     double const size = log_uniform(random, 1e-3, 1e3);
     Pair<T> const pair(corners_of(random, feature, size * log_uniform(random, 1e-2, 0.3), size));
-    auto const found = closest_points(of_triangle(feature), pair.y);
+    auto const found = closest_points(kind_of(feature), pair.y);
     INFO("pair " << k);
     REQUIRE(found.feature == feature);
   }
@@ -181,8 +181,8 @@ TEST_CASE("closest points do not see translations and rotations", "[contact]") {
       here[a] = y[a];
       there[a] = turn(y[a]) + shift;
     }
-    auto const p = closest_points(of_triangle(feature), here);
-    auto const q = closest_points(of_triangle(feature), there);
+    auto const p = closest_points(kind_of(feature), here);
+    auto const q = closest_points(kind_of(feature), there);
     REQUIRE(p.feature == q.feature);
     CHECK(norm(turn(p.t) - q.t) < 1e-13);
     for (int a = 0; a < 4; ++a) CHECK(std::abs(p.c[a] - q.c[a]) < 1e-12);

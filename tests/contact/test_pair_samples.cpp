@@ -142,16 +142,16 @@ long double to_segment(Vec3<long double> const& b, Vec3<long double> const& e) {
 }  // namespace
 
 Corners corners_of(Random& random, Feature feature, double gap, double size) {
-  return of_triangle(feature) ? corners_of_triangle(random, feature, gap, size)
-                              : corners_of_edges(random, feature, gap, size);
+  return kind_of(feature) == PairKind::point_triangle
+             ? corners_of_triangle(random, feature, gap, size)
+             : corners_of_edges(random, feature, gap, size);
 }
 
-long double searched_point_triangle(Vec3<long double> const (&y)[4]) {
-  Vec3<long double> const b = y[0] - y[1], e1 = y[2] - y[1], e2 = y[3] - y[1];
-  return least([&](long double v) { return to_segment(b - v * e2, (1 - v) * e1); });
-}
-
-long double searched_edge_edge(Vec3<long double> const (&y)[4]) {
+long double searched_distance(PairKind kind, Vec3<long double> const (&y)[4]) {
+  if (kind == PairKind::point_triangle) {
+    Vec3<long double> const b = y[0] - y[1], e1 = y[2] - y[1], e2 = y[3] - y[1];
+    return least([&](long double v) { return to_segment(b - v * e2, (1 - v) * e1); });
+  }
   Vec3<long double> const b = y[0] - y[2], e1 = y[1] - y[0], e2 = y[3] - y[2];
   return least([&](long double s) { return to_segment(b + s * e1, e2); });
 }
@@ -255,8 +255,7 @@ TEST_CASE("the search for a distance finds the gap that a pair was made with", "
     Corners const y = corners_of(random, feature, gap, 1);
     Vec3<long double> w[4];
     for (int a = 0; a < 4; ++a) w[a] = cast<long double>(y[std::size_t(a)]);
-    auto const found =
-        double(of_triangle(feature) ? searched_point_triangle(w) : searched_edge_edge(w));
+    auto const found = double(searched_distance(kind_of(feature), w));
     INFO("feature " << k % features << ", gap " << gap);
     CHECK(std::abs(found - gap) < 1e-14);
   }
