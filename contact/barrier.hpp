@@ -49,7 +49,7 @@ namespace kernels {
 inline constexpr double ln2 = 0.693147180559945309417232121458;
 }
 
-/// The logarithm of the unsquared distance, g = -(1 - x)^2 ln x (Shen et al. 2024, equation 7).
+/// The logarithm of the unsquared distance, g = -(1 - x)^2 ln x (Shen et al. 2024, equation 2).
 struct LogBarrier {
   static constexpr char const* name = "log";
   static constexpr double curvature_at_half = 5 + 2 * kernels::ln2;
@@ -89,8 +89,8 @@ KOKKOS_FORCEINLINE_FUNCTION RelativeStep<T> squared(RelativeDistance<T> const& b
 }
 }  // namespace kernels
 
-/// The logarithm of the squared distance, g = -(1 - x^2)^2 ln x^2 (Li et al. 2020, Incremental
-/// Potential Contact, equation 6, divided by D^2).
+/// The logarithm of the squared distance, g = -(1 - x^2)^2 ln x^2: the barrier of Incremental
+/// Potential Contact (Li et al. 2020) as its code takes it, -(d^2 - D^2)^2 ln(d^2 / D^2), over D^2.
 struct IpcBarrier {
   static constexpr char const* name = "ipc";
   static constexpr double curvature_at_half = 16.5 - 2 * kernels::ln2;

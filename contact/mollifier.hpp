@@ -1,7 +1,6 @@
 // A factor m on the energy of two edges that takes it to zero as they become parallel. There the
 // closest points jump from end to end, and with them the force; a minimiser would cycle at the kink
-// (Li et al. 2020, section 4 of the supplement, with e the product of a threshold and the squared
-// rest lengths):
+// (Li et al. 2020, Incremental Potential Contact; e is a threshold times the squared rest lengths):
 //
 //   m = (2 - q / e) q / e   for q = |u x v|^2 < e,   else 1
 //

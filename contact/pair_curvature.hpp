@@ -1,15 +1,14 @@
-// Curvature of a pair's energy E = m(q) b(d), as policies. With delta = Sum_a c_a p_a and n = t /
-// d, the second derivative along a motion p of the vertices is
+// Curvature of a pair's energy E = m(q) b(d), as policies. With delta = Sum_a c_a p_a and n = t / d
+// the second derivative along a motion p of the vertices is
 //
-//   m [ b'' (n.delta)^2 + b'/d (|delta|^2 - (n.delta)^2) ]              c held (Shen et al., eq.
-//   12)
-//   - m b'/d Sum_k (k.delta + d n.(dc_k p))^2                            c follows (Schur
-//   complement)
-//   + 2 m' b' dq (n.delta) + b [ m'' dq^2 + m' d2q ]                     mollified
+//   m [ b'' (n.delta)^2 + b'/d (|delta|^2 - (n.delta)^2) ]     with c held
+//   - m b'/d Sum_k (k.delta + d n.(dc_k p))^2                  as c follows: Schur complement
+//   + 2 m' b' dq (n.delta) + b (m'' dq^2 + m' d2q)             of the mollifier
 //
 // where k runs over orthonormal directions in which the closest points may slide, and dc_k p =
-// Sum_a (dc_a/dk) p_a. As b' < 0 the first line alone is below the truth, and negative more often.
-// The Gauss-Newton form takes (w, d) as functions of p to first order; it is never negative.
+// Sum_a (dc_a/dk) p_a. The first line is all that Shen et al. 2024 keep (equation 10); as b' < 0 it
+// is below the truth, and negative more often. The Gauss-Newton form takes (w, d) as functions of p
+// to first order; it is never negative.
 #pragma once
 
 #include <taut/contact/pair_state.hpp>

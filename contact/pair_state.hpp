@@ -13,9 +13,9 @@ namespace taut {
 
 template <class T>
 struct PairParameters {
-  T stiffness;             ///< K, N/m
-  T activation;            ///< D, m: the pair has no energy from this distance on
-  T mollifier_scale = {};  ///< of Mollifier::scale for edges, 1/m^2; not used for other pairs
+  T stiffness;        ///< K, N/m
+  T activation;       ///< D, m: the pair has no energy from this distance on
+  T mollifier_scale;  ///< Mollifier::scale of edges, 1/m^2; unused by NoMollifier and triangles
 };
 
 template <class T>

@@ -76,7 +76,8 @@ TEST_CASE("pairs reproduce the shared vectors", "[contact]") {
         y[a][k] = c["y"][a][k];
         p[a][k] = c["p"][3 * a + k];
       }
-    auto const s = Paper::evaluate(pair_kind, PairParameters<double>{c["kappa"], c["dhat"]}, y);
+    auto const s =
+        Paper::evaluate(pair_kind, PairParameters<double>{c["kappa"], c["dhat"], 0.0}, y);
     double const d = c["d"];
     CHECK_THAT(s.at.distance, WithinRel(d, 1e-11));
     CHECK_THAT(Paper::value(s), WithinRel(double(c["b"]), 1e-11));
@@ -149,7 +150,7 @@ TEST_CASE("the truncated curvature falls short of the exact one as the shared st
         y[a] = corners[a];
         p[a] = uniform_vector(random);
       }
-      auto const s = Paper::evaluate(kind_of(feature), PairParameters<double>{4.0, dhat}, y);
+      auto const s = Paper::evaluate(kind_of(feature), PairParameters<double>{4.0, dhat, 0.0}, y);
       REQUIRE(s.at.feature == feature);
       double const paper = TruncatedCurvature::form(s, p), exact = ExactCurvature::form(s, p);
       paper_le_exact += paper <= exact;
