@@ -139,7 +139,9 @@ TEST_CASE("what a solver gets of a curvature is positive and not below it", "[co
           CHECK(least_eigenvalue(block) > -round_off);
           CHECK(quadratic(block, p[a]) > dot(p[a], Curvature::block(s, a, a) * p[a]) - round_off);
           for (int k = 0; k < 3; ++k) {
-            CHECK(diagonal[k] == std::max(0.0, Curvature::block(s, a, a)(k, k)));
+            CHECK(diagonal[k] >= 0);
+            CHECK(std::abs(diagonal[k] - std::max(0.0, Curvature::block(s, a, a)(k, k))) <
+                  round_off);
           }
         }
       };
@@ -165,7 +167,8 @@ TEST_CASE("the truncated curvature is the exact one where nothing slides, else b
       if (slides) {
         CHECK(truncated < exact);
       } else {
-        CHECK(truncated == exact);
+        Wide const size = largest(assembled(s, blocks<ExactCurvature>));
+        CHECK(std::abs(truncated - exact) < 1e-16L * size);
       }
     });
   });
