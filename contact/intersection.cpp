@@ -7,6 +7,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <set>
 
 namespace taut {
 
@@ -157,14 +158,11 @@ std::vector<Intersection> IntersectionTest::meeting(std::span<Point const> x) co
 void IntersectionTest::add_inside(std::span<Point const> x,
                                   std::vector<Intersection>& found) const {
   // A surface that meets nothing of a body is on one side of it as a whole.
-  std::vector<std::array<std::int32_t, 2>> meet;
+  std::set<std::array<std::int32_t, 2>> settled;
   for (Intersection const& i : found) {
-    meet.push_back({i.edge_body, i.triangle_body});
-    meet.push_back({i.triangle_body, i.edge_body});
+    settled.insert({i.edge_body, i.triangle_body});
+    settled.insert({i.triangle_body, i.edge_body});
   }
-  std::sort(meet.begin(), meet.end());
-  meet.erase(std::unique(meet.begin(), meet.end()), meet.end());
-
   std::vector<std::int32_t> closed;
   std::vector<Box> boxes;
   for (std::size_t b = 0; b < bodies_.size(); ++b) {
@@ -183,8 +181,9 @@ void IntersectionTest::add_inside(std::span<Point const> x,
     for (std::int32_t const k : near) {
       std::int32_t const outer = closed[k];
       if (outer == inner) continue;
-      if (std::binary_search(meet.begin(), meet.end(), std::array{inner, outer})) continue;
+      if (settled.contains({inner, outer})) continue;
       if (winding_number(x, bodies_[outer].triangles, place) == 0) continue;
+      settled.insert({inner, outer});
       found.push_back({IntersectionKind::inside, {v, v}, {-1, -1, -1}, inner, outer, place});
     }
   }

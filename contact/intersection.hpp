@@ -10,8 +10,8 @@
 //
 // A pair that touches is at distance zero, and counts like any other.
 //
-// What it does not see: a pair with a common vertex that folds onto itself without any other edge
-// touching a triangle; two vertices alone.
+// What it does not see: a pair with a common vertex that folds onto itself, where no other edge
+// touches a triangle; edges without triangles among themselves.
 #pragma once
 
 #include <taut/contact/edge_triangle.hpp>
@@ -53,10 +53,10 @@ public:
   explicit IntersectionTest(IntersectionMesh mesh);
 
   /// All intersections at positions x (m, one per vertex), by edge, then by triangle; then the
-  /// bodies inside others, by their first vertex. A body is inside another if that is closed and
-  /// none of their edges and triangles meet; so one that is in several parts may be named more than
-  /// once. What is inside an open surface has no meaning, and is not asked. Throws Error if the
-  /// number of positions is wrong or a vertex of the mesh is not finite.
+  /// bodies inside others, by vertex, once per pair. A body is inside another if that is closed,
+  /// any connected part of the body is within it, and none of their edges and triangles meet. What
+  /// is inside an open surface has no meaning, and is not asked. Throws Error if the number of
+  /// positions is wrong or a vertex of the mesh is not finite.
   std::vector<Intersection> find(std::span<Point const> x) const;
 
 private:

@@ -220,6 +220,11 @@ TEST_CASE("a body wholly inside another is found, and only then", "[exact]") {
     bodies.add(cube(0.25), {1.1, 1.1, 0.1});
     CHECK(insides(bodies.find()) == std::vector<std::array<std::int32_t, 2>>{{1, 0}});
   }
+  SECTION("a hollow body is inside once, not with both of its surfaces") {
+    bodies.add(hollow_cube(3));
+    bodies.add(cube(9));
+    CHECK(insides(bodies.find()) == std::vector<std::array<std::int32_t, 2>>{{0, 1}});
+  }
   SECTION("what touches from within is said to touch") {
     bodies.add(cube(1));
     bodies.add(cube(0.5), {0.25, 0, 0});
