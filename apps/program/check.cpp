@@ -1,5 +1,6 @@
 // `taut check`: looks at every frame of a result for what must not be there.
 #include <taut/apps/program/commands.hpp>
+#include <taut/apps/program/intersections.hpp>
 #include <taut/apps/program/simulation.hpp>
 #include <taut/core/io/vtkhdf.hpp>
 #include <taut/core/report/error.hpp>
@@ -7,6 +8,7 @@
 #include <fmt/core.h>
 
 #include <cmath>
+#include <optional>
 
 namespace taut {
 
@@ -34,23 +36,40 @@ std::size_t not_finite(std::vector<Point> const& field) {
 }
 }  // namespace
 
-int check_command(std::filesystem::path const& result) {
+int check_command(std::filesystem::path const& result, bool intersections) {
   ResultReader const reader(result_file(result));
-  TetMesh const& mesh = reader.mesh().mesh;
-  std::int64_t bad = 0;
+  ResultMesh const& all = reader.mesh();
+  TetMesh const& mesh = all.mesh;
+  std::optional<ObjectIntersections> surface;
+  if (intersections) surface.emplace(mesh.tets, all.object, all.object_names, mesh.points.size());
+  constexpr std::int64_t in_detail = 3;  // frames whose first intersections are listed
+  std::int64_t bad = 0, intersecting = 0;
+  std::size_t sum = 0;
   for (std::int64_t frame = 0; frame < reader.frames(); ++frame) {
     auto const x = reader.positions(frame);
     auto const inverted = inverted_tets(mesh, x);
     std::size_t lost = not_finite(x);
+    std::vector<Intersection> found;
+    bool const looked = surface && lost == 0;
+    if (looked) found = surface->find(x);
     if (reader.has_velocities()) lost += not_finite(reader.velocities(frame));
-    if (inverted.empty() && lost == 0) continue;
+    if (inverted.empty() && lost == 0 && found.empty()) continue;
     ++bad;
-    fmt::print("frame {} ({:.6g} s): {} inverted elements{}, {} values not finite\n", frame,
+    fmt::print("frame {} ({:.6g} s): {} inverted elements{}, {} values not finite{}\n", frame,
                reader.times()[frame], inverted.size(),
-               inverted.empty() ? "" : fmt::format(" (first: {})", inverted.front()), lost);
+               inverted.empty() ? "" : fmt::format(" (first: {})", inverted.front()), lost,
+               !found.empty()       ? ", " + surface->count(found)
+               : surface && !looked ? ", not looked for intersections"
+                                    : "");
+    if (found.empty()) continue;
+    sum += found.size();
+    if (++intersecting <= in_detail) fmt::print("{}", surface->first_few(found, 3));
   }
-  fmt::print("{} frames of {} tets: {}\n", reader.frames(), mesh.tets.size(),
-             bad == 0 ? "clean" : fmt::format("{} with faults", bad));
+  fmt::print("{} frames of {} tets: {}{}\n", reader.frames(), mesh.tets.size(),
+             bad == 0 ? "clean" : fmt::format("{} with faults", bad),
+             !intersections ? ", not looked for intersections"
+             : sum > 0      ? fmt::format("; {} intersections in {} of them", sum, intersecting)
+                            : "");
   return bad == 0 ? 0 : 1;
 }
 

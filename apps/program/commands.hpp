@@ -21,16 +21,22 @@ std::vector<std::filesystem::path> scene_folders();
 /// The file of a scene that is named by its path or is built in. Throws Error naming the nearest.
 std::filesystem::path find_scene(std::string const& name);
 
+/// When a run looks for intersections. A scene that starts with some is refused if any later ones
+/// are looked for, and warned of if not.
+enum class CheckRun { off, every_step };
+
 struct RunOptions {
   SceneArguments scene;
   std::filesystem::path out;  ///< empty: results/NAME
   bool force = false;
   bool restart = false;
+  CheckRun check = CheckRun::off;
 };
 int run_command(RunOptions const& options);
 
-/// Every frame of a result: inverted elements, values that are not finite. 0 if there are none.
-int check_command(std::filesystem::path const& result);
+/// Every frame of a result: inverted elements, values that are not finite and, unless left out,
+/// intersections and objects inside others. 0 if there are none.
+int check_command(std::filesystem::path const& result, bool intersections = true);
 
 int scenes_command();
 int methods_command();

@@ -14,6 +14,7 @@
 #include <algorithm>
 #include <cstdlib>
 #include <functional>
+#include <map>
 #include <new>
 #include <optional>
 
@@ -81,6 +82,13 @@ int main(int argc, char** argv) {
   run_app->add_option("--out", run.out, "folder of the result (results/NAME)");
   run_app->add_flag("--force", run.force, "replaces a result that is there");
   run_app->add_flag("--restart", run.restart, "goes on from the checkpoint in --out");
+  run_app
+      ->add_option("--check", run.check,
+                   "off, or every-step: ends at the first step that leaves an intersection (off)")
+      ->transform(
+          CLI::CheckedTransformer(std::map<std::string, CheckRun>{
+                                      {"off", CheckRun::off}, {"every-step", CheckRun::every_step}})
+              .description("{off,every-step}"));
   run_app->footer("example: taut run stretch_twist --frames 100 --method newton --out /tmp/twist");
   run_app->callback([&] { command = [&] { return run_command(run); }; });
 
@@ -94,10 +102,13 @@ int main(int argc, char** argv) {
 
   std::string checked;
   auto* check_app = app.add_subcommand(
-      "check", "looks for inverted elements and values that are not finite in every frame");
+      "check", "looks for inverted elements, values that are not finite and intersections");
+  bool no_intersections = false;
   check_app->add_option("result", checked, "a folder that `taut run` wrote")->required();
+  check_app->add_flag("--no-intersections", no_intersections,
+                      "for bodies that may pass through each other: does not look for these");
   check_app->footer("example: taut check results/drag");
-  check_app->callback([&] { command = [&] { return check_command(checked); }; });
+  check_app->callback([&] { command = [&] { return check_command(checked, !no_intersections); }; });
 
   SceneArguments plan;
   auto* plan_app = app.add_subcommand("plan", "says what a scene is composed of, and why");

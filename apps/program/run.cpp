@@ -1,5 +1,6 @@
 // `taut run`: steps a scene and writes its result, report and checkpoints.
 #include <taut/apps/program/commands.hpp>
+#include <taut/apps/program/intersections.hpp>
 #include <taut/apps/program/memory.hpp>
 #include <taut/apps/program/methods.hpp>
 #include <taut/apps/program/run_identity.hpp>
@@ -78,11 +79,38 @@ void clear_folder(std::filesystem::path const& folder) {
   }
 }
 
+ObjectIntersections intersections_of(SceneGeometry const& geometry) {
+  std::vector<std::string> names;
+  for (ObjectPart const& object : geometry.objects) names.push_back(object.name);
+  return {geometry.mesh.tets, geometry.object_of_tet, names, geometry.mesh.points.size()};
+}
+
+/// Nothing in a scene keeps bodies apart yet, so that one which starts intersecting may be meant
+/// to: it is warned of, unless the run is to be free of intersections.
+void check_start(Scene const& scene, SceneGeometry& geometry, ObjectIntersections const& surface,
+                 RunOptions const& options) {
+  auto const found = surface.find(geometry.start);
+  if (found.empty()) return;
+  std::string const what =
+      fmt::format("{}: the scene starts with {}; the first: {}", scene.file.string(),
+                  surface.count(found), surface.text(found.front()));
+  if (options.check != CheckRun::off && !options.restart) {
+    throw Error(
+        "{}. Move the objects apart (object.NAME.translate), let one that meets itself start at "
+        "rest, or run without --check",
+        what);
+  }
+  geometry.warnings.push_back(what + ". Nothing keeps bodies apart yet");
+}
+
 class Run {
 public:
-  Run(Scene const& scene, SceneGeometry const& geometry, RunOptions const& options)
+  /// `surface`: where steps are to be checked.
+  Run(Scene const& scene, SceneGeometry const& geometry, RunOptions const& options,
+      ObjectIntersections const* surface)
       : scene_(scene),
         geometry_(geometry),
+        surface_(surface),
         folder_(options.out.empty() ? std::filesystem::path("results") / scene.name : options.out),
         text_(run_identity(options.scene.changes, scene, geometry)),
         simulation_(Simulation::create(scene, geometry)) {
@@ -184,9 +212,13 @@ private:
   }
 
   void step() {
+    Checkpoint before;
+    if (surface_) simulation_->save(before);
     Timer const timer;
     NewtonReport const r = simulation_->step();
-    totals_.seconds += timer.seconds();
+    double const seconds = timer.seconds();
+    if (surface_) refuse_intersections(before);
+    totals_.seconds += seconds;
     ++totals_.steps;
     totals_.iterations += r.iterations;
     totals_.converged += r.converged();
@@ -212,7 +244,7 @@ private:
         .set("cuts", r.cuts)
         .set("refreshes", r.refreshes)
         .set("linear_iterations", r.linear_iterations)
-        .set("seconds", timer.seconds());
+        .set("seconds", seconds);
     if (scene_.output.check) {
       auto const inverted = inverted_tets(geometry_.mesh, simulation_->positions()).size();
       totals_.most_inverted = std::max(totals_.most_inverted, static_cast<double>(inverted));
@@ -223,6 +255,21 @@ private:
     totals_.worst_error = std::max(totals_.worst_error, r.error_estimate_m);
     note_ = fmt::format("{} its, error {:.1e} m{}", r.iterations, r.error_estimate_m,
                         r.converged() ? "" : fmt::format(", {}", to_string(r.stop)));
+  }
+
+  /// After a step that leaves intersections: goes back to the state before it, puts that into the
+  /// result and throws.
+  void refuse_intersections(Checkpoint const& before) {
+    auto const found = surface_->find(simulation_->positions());
+    if (found.empty()) return;
+    int const step = simulation_->steps();
+    double const time = simulation_->time();
+    simulation_->restore(before);
+    if (!on_grid()) write_frame();
+    throw Error(
+        "step {} at {:.6g} s leaves {}; the first: {}. The state before it is the last frame. "
+        "Nothing keeps bodies apart yet: --restart without --check goes on",
+        step, time, surface_->count(found), surface_->text(found.front()));
   }
 
   void write_frame() {
@@ -294,6 +341,7 @@ private:
 
   Scene const& scene_;
   SceneGeometry const& geometry_;
+  ObjectIntersections const* surface_;  ///< null: not asked for
   std::filesystem::path folder_;
   std::string text_;
   std::unique_ptr<Simulation> simulation_;
@@ -309,9 +357,11 @@ private:
 
 int run_command(RunOptions const& options) {
   Scene const scene = load_scene(find_scene(options.scene.scene), options.scene.changes);
-  SceneGeometry const geometry = build_within_memory(scene);
+  SceneGeometry geometry = build_within_memory(scene);
+  ObjectIntersections const surface = intersections_of(geometry);
+  check_start(scene, geometry, surface, options);
   for (std::string const& warning : geometry.warnings) fmt::print(stderr, "warning: {}\n", warning);
-  return Run(scene, geometry, options).run();
+  return Run(scene, geometry, options, options.check == CheckRun::off ? nullptr : &surface).run();
 }
 
 }  // namespace taut

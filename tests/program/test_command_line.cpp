@@ -1,44 +1,12 @@
 // The command line of the program itself: what it takes, and what it says to what it does not.
-#include <catch2/matchers/catch_matchers_string.hpp>
+#include "command_line.hpp"
 
-#include <sys/wait.h>
-
-#include <array>
-#include <cstdio>
 #include <cstdlib>
-
-#include "scene_text.hpp"
 
 using Catch::Matchers::ContainsSubstring;
 using namespace taut;
-
-namespace {
-
-struct Outcome {
-  int status;
-  std::string text;  ///< of stdout and stderr
-};
-
-Outcome taut_with(std::string const& arguments) {
-  std::string const command = test::program().string() + " " + arguments + " 2>&1";
-  std::FILE* pipe = ::popen(command.c_str(), "r");
-  REQUIRE(pipe != nullptr);
-  Outcome outcome{-1, {}};
-  std::array<char, 4096> buffer;
-  for (std::size_t n; (n = std::fread(buffer.data(), 1, buffer.size(), pipe)) > 0;)
-    outcome.text.append(buffer.data(), n);
-  outcome.status = WEXITSTATUS(::pclose(pipe));
-  return outcome;
-}
-
-void says(std::string const& arguments, int status, std::string const& part) {
-  INFO("taut " << arguments);
-  Outcome const outcome = taut_with(arguments);
-  CHECK(outcome.status == status);
-  CHECK_THAT(outcome.text, ContainsSubstring(part));
-}
-
-}  // namespace
+using test::says;
+using test::taut_with;
 
 TEST_CASE("options do not swallow the scene after them", "[cli]") {
   test::ScratchFolder const folder;
@@ -89,6 +57,7 @@ TEST_CASE("plan says what a step ends by", "[cli]") {
   says("plan " + scene, 0, "when the error is estimated to be below");
   says("plan " + scene + " --set solver.stopping=budget", 0, "whatever the error is then");
   says("plan " + scene + " --set solver.stopping=energy_drop", 0, "of what the first one did");
-  Outcome const quasi_static = taut_with("plan " + scene + " --set time.integrator=quasi_static");
+  test::Outcome const quasi_static =
+      taut_with("plan " + scene + " --set time.integrator=quasi_static");
   CHECK_THAT(quasi_static.text, !ContainsSubstring("wave") && !ContainsSubstring("m/s"));
 }
