@@ -74,8 +74,8 @@ KOKKOS_INLINE_FUNCTION Reach<T> settle(T alpha, T kept, T at_most, Settled whole
 }  // namespace kernels
 
 struct AdditiveCcd {
-  int iterations = 32;          ///< at most; what they have certified counts
-  double tolerance = 1.0 / 64;  ///< ends where an iteration adds less than this share of alpha
+  int iterations = 64;           ///< at most; what they have certified counts
+  double tolerance = 1.0 / 256;  ///< ends where an iteration adds less than this share of alpha
 
   /// Rest, boxes, and one direction. Leaves open, with the alpha and the distance to keep that the
   /// direction gave, what needs more than one.

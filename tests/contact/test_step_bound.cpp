@@ -260,8 +260,8 @@ TEMPLATE_LIST_TEST_CASE("a bound is not needlessly short", "[step_bound]", AllSc
     std::sort(closing.begin(), closing.end());
     CAPTURE(share, ratio[0], ratio[15], ratio[150], closing[15], closing[150]);
     CHECK(ratio[299] < 1 + 1e-3);
-    CHECK(ratio[150] > 0.98);
-    CHECK(ratio[15] > 0.9);
+    CHECK(ratio[150] > 0.99);
+    CHECK(ratio[15] > 0.95);
     CHECK(closing[150] > 0.3);
     CHECK(closing[150] < ratio[150]);
   }
@@ -295,7 +295,8 @@ TEMPLATE_LIST_TEST_CASE("certificates settle most of what a contact scene asks",
                         AllScalars) {
   using T = typename TestType::T;
   using Position = typename TestType::Position;
-  // Candidates up to 1.5 dhat apart, dhat 0.3 of an edge, in a step of up to 0.1 dhat.
+  // Candidates up to 1.5 dhat apart, dhat 0.3 of an edge; each corner moves by up to 0.1 dhat in
+  // each direction.
   Samples samples(13);
   Tally tally;
   int const count = 4000;
@@ -316,8 +317,8 @@ TEMPLATE_LIST_TEST_CASE("certificates settle most of what a contact scene asks",
   int const boxes = tally.settled[int(Settled::boxes)];
   int const direction = tally.settled[int(Settled::direction)];
   CAPTURE(boxes, direction, tally.settled[int(Settled::advance)], tally.settled[int(Settled::cut)]);
-  CHECK(boxes > 0.3 * count);
-  CHECK(boxes + direction > 0.85 * count);
+  CHECK(boxes > 0.9 * count);
+  CHECK(boxes + direction > 0.99 * count);
   CHECK(tally.settled[int(Settled::uncertain)] == 0);
 }
 

@@ -172,7 +172,7 @@ TEMPLATE_LIST_TEST_CASE("the step of a sweep keeps every pair apart where it is 
 }
 
 TEST_CASE("fp32 kernels leave to fp64 what is too near for them", "[step_bound]") {
-  // 1e-6 apart at size 1, and mixed precision: the positions tell, fp32 differences hardly do.
+  // 1e-9 apart at size 1, in mixed precision: the positions tell, fp32 differences do not.
   PairMotion const m{PairKind::point_triangle,
                      {{0.25, 0.25, 1e-9}, {0, 0, 0}, {1, 0, 0.3}, {0, 1, -0.3}},
                      {{0, 0, -1e-9}, {0, 0, 0}, {0, 0, 0}, {0, 0, 0}}};
