@@ -337,7 +337,8 @@ TEMPLATE_LIST_TEST_CASE("what nothing can be proved about gets no step", "[step_
     for (Hardship h : {Hardship::none, Hardship::tiny_gap, Hardship::sliding}) {
       for (int k = 0; k < 72; ++k) {
         PairMotion m = samples.motion<Position, Real>(kind, h);
-        (k < 36 ? m.x : m.p)[k % 4][k / 4 % 3] = bad[k / 12 % 3];
+        Vec3<double>& spoilt = k < 36 ? m.x[k % 4] : m.p[k % 4];
+        spoilt[k / 4 % 3] = bad[k / 12 % 3];
         CAPTURE(int(kind), int(h), k);
         CHECK(uncertain(m, AdditiveCcd{}));
         CHECK(uncertain(m, PairwiseClosing{}));
