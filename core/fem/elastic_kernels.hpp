@@ -44,7 +44,11 @@ struct GradientSweep : PatchSweep<S, typename Precision::real> {
                                            Real* slots) const {
     Mat3<T> const P = Material::stress(state);
     Vec3<T> rest{T(0), T(0), T(0)};
+#if defined(__CUDACC__)
+#pragma unroll
+#else
 #pragma GCC unroll 4
+#endif
     for (int a = 0; a < 4; ++a) {
       Vec3<T> const b = shape_gradient(B, a);
       Vec3<T> const f = a < 3 ? P * b : -rest;
