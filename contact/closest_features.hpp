@@ -1,0 +1,186 @@
+// The closest points of the two kinds of pairs that surface meshes have in contact: a vertex and a
+// triangle, two edges. Both are one problem for four vertices y and four coefficients c, whose sum
+// is zero (Shen et al. 2024, section 4.2):
+//
+//   t = Sum_a c_a y_a,   distance = |t|,   c = (1, -w0, -w1, -w2)         point, triangle
+//                                          c = (1 - s, s, -(1 - u), -u)   edges a0 a1 and b0 b1
+//
+// The interior of the triangle, or of both edges, is the least-squares problem
+// min |b - x1 e1 - x2 e2|. Modified Gram-Schmidt on e1, e2 and b together is backward stable
+// whatever the angle between e1 and e2 (Bjorck 1967): what it returns is the exact answer for
+// vertices moved by round-off, so needles and nearly parallel edges cost no accuracy of the
+// distance. If its answer lies inside, it is the closest pair; if not, some end or edge is, and the
+// nearest of all projections on edges is taken.
+//
+// Error of the distance: at most 4 epsilon (|b| + |e1| + |e2|), for any pair, degenerate or not,
+// whose size is within 1e-10 and 1e15 (fp32) or 1e-100 and 1e150 (fp64). Only differences of
+// vertices are used, so coordinates far from the origin cost no more than their own rounding.
+#pragma once
+
+#include <taut/core/math/matrix.hpp>
+
+#include <cstdint>
+
+namespace taut {
+
+enum class PairKind : std::uint8_t { point_triangle, edge_edge };
+
+/// Where the closest points lie: the Voronoi region of a pair.
+enum class Feature : std::uint8_t {
+  face,  ///< of the triangle: its interior, the interior of an edge, a vertex
+  edge_01,
+  edge_12,
+  edge_20,
+  vertex_0,
+  vertex_1,
+  vertex_2,
+  edge_edge,  ///< of two edges: inside both
+  a0_b,       ///< an end of one, inside the other
+  a1_b,
+  a_b0,
+  a_b1,
+  a0_b0,  ///< an end of each
+  a0_b1,
+  a1_b0,
+  a1_b1
+};
+
+template <class T>
+struct ClosestPoints {
+  Vec3<T> t;        ///< Sum_a c_a y_a, from the second closest point to the first, m
+  T distance;       ///< |t|
+  T c[4];           ///< each in [-1, 1], zero for vertices that the feature does not touch
+  Feature feature;  ///< fits c: c is zero where the feature says so, and nowhere else
+};
+
+namespace kernels {
+
+/// min over x of |b - x1 e1 - x2 e2|, by modified Gram-Schmidt.
+template <class T>
+struct LeastSquares {
+  bool regular;  ///< e1 and e2 are not parallel to round-off; only then is there an answer
+  T x1, x2;
+};
+
+template <class T>
+KOKKOS_INLINE_FUNCTION LeastSquares<T> least_squares(Vec3<T> const& b, Vec3<T> const& e1,
+                                                     Vec3<T> const& e2) {
+  // Below this sine e1 and e2 are parallel after a change of either by round-off, and the closest
+  // points may be taken at an end.
+  constexpr T parallel = 4 * Kokkos::Experimental::epsilon_v<T>;
+  T const e11 = dot(e1, e1);
+  if (!(e11 > T(0))) return {false, T(0), T(0)};
+  T const r = dot(e1, e2) / e11;
+  Vec3<T> const q = e2 - r * e1;
+  T const qq = dot(q, q);
+  if (!(qq > square(parallel) * dot(e2, e2))) return {false, T(0), T(0)};
+  T const s = dot(e1, b) / e11;
+  T const x2 = dot(q, b - s * e1) / qq;
+  return {true, s - r * x2, x2};
+}
+
+/// The nearest point s e, 0 <= s <= 1, of a segment to b.
+template <class T>
+struct Foot {
+  T s;
+  Vec3<T> t;  ///< b - s e
+  T t2;       ///< |t|^2
+  KOKKOS_FORCEINLINE_FUNCTION bool inside() const { return s > T(0) && s < T(1); }
+};
+
+template <class T>
+KOKKOS_INLINE_FUNCTION Foot<T> foot_on_segment(Vec3<T> const& b, Vec3<T> const& e) {
+  T const ee = dot(e, e), be = dot(b, e);
+  T const s = be > T(0) ? (be < ee ? be / ee : T(1)) : T(0);
+  Vec3<T> const t = s < T(1) ? b - s * e : b - e;
+  return {s, t, dot(t, t)};
+}
+
+/// Whether foot `a` is the nearer. Round-off decides between the inside of an edge and its own end,
+/// where the distances agree to second order; there the inside is right, and gives the direction
+/// to full accuracy.
+template <class T>
+KOKKOS_INLINE_FUNCTION bool nearer(Foot<T> const& a, Foot<T> const& b) {
+  constexpr T tie = 1 - 16 * Kokkos::Experimental::epsilon_v<T>;
+  if (a.inside() == b.inside()) return a.t2 < b.t2;
+  return a.inside() ? tie * a.t2 < b.t2 : a.t2 < tie * b.t2;
+}
+
+}  // namespace kernels
+
+/// y = the point and the corners of the triangle, finite, m.
+template <class T>
+KOKKOS_INLINE_FUNCTION ClosestPoints<T> closest_point_triangle(Vec3<T> const (&y)[4]) {
+  Vec3<T> const b = y[0] - y[1], e1 = y[2] - y[1], e2 = y[3] - y[1];
+  auto const [regular, w1, w2] = kernels::least_squares(b, e1, e2);
+  if (regular && w1 > T(0) && w2 > T(0) && w1 + w2 < T(1)) {
+    Vec3<T> const t = b - w1 * e1 - w2 * e2;
+    return {t, norm(t), {T(1), w1 + w2 - T(1), -w1, -w2}, Feature::face};
+  }
+  int edge = 0;
+  auto nearest = kernels::foot_on_segment(b, e1);
+  for (int k = 1; k < 3; ++k) {
+    auto const foot = kernels::foot_on_segment(y[0] - y[1 + k], y[1 + (k + 1) % 3] - y[1 + k]);
+    if (kernels::nearer(foot, nearest)) {
+      nearest = foot;
+      edge = k;
+    }
+  }
+  int const from = edge, to = (edge + 1) % 3;
+  ClosestPoints<T> r{nearest.t, Kokkos::sqrt(nearest.t2), {T(1), T(0), T(0), T(0)}, Feature::face};
+  if (nearest.inside()) {
+    r.c[1 + from] = nearest.s - T(1);
+    r.c[1 + to] = -nearest.s;
+    r.feature = static_cast<Feature>(static_cast<int>(Feature::edge_01) + edge);
+  } else {
+    int const vertex = nearest.s > T(0) ? to : from;
+    r.c[1 + vertex] = T(-1);
+    r.feature = static_cast<Feature>(static_cast<int>(Feature::vertex_0) + vertex);
+  }
+  return r;
+}
+
+/// y = the ends of edge a and of edge b, finite, m.
+template <class T>
+KOKKOS_INLINE_FUNCTION ClosestPoints<T> closest_edge_edge(Vec3<T> const (&y)[4]) {
+  Vec3<T> const b = y[0] - y[2], e1 = y[0] - y[1], e2 = y[3] - y[2];
+  auto const [regular, s, u] = kernels::least_squares(b, e1, e2);
+  if (regular && s > T(0) && s < T(1) && u > T(0) && u < T(1)) {
+    Vec3<T> const t = b - s * e1 - u * e2;
+    return {t, norm(t), {T(1) - s, s, u - T(1), -u}, Feature::edge_edge};
+  }
+  int end = 0;  // of a0, a1, b0, b1 the one that is projected on the other edge
+  auto nearest = kernels::foot_on_segment(b, e2);
+  for (int k = 1; k < 4; ++k) {
+    int const from = k < 2 ? 2 : 0;
+    auto const foot = kernels::foot_on_segment(y[k] - y[from], y[from + 1] - y[from]);
+    if (kernels::nearer(foot, nearest)) {
+      nearest = foot;
+      end = k;
+    }
+  }
+  bool const of_a = end < 2;
+  int const from = of_a ? 2 : 0;
+  T const sign = of_a ? T(1) : T(-1);
+  ClosestPoints<T> r{
+      sign * nearest.t, Kokkos::sqrt(nearest.t2), {T(0), T(0), T(0), T(0)}, Feature::edge_edge};
+  r.c[end] = sign;
+  r.c[from] = sign * (nearest.s - T(1));
+  r.c[from + 1] = -sign * nearest.s;
+  if (nearest.inside()) {
+    r.feature = static_cast<Feature>(static_cast<int>(Feature::a0_b) + end);
+  } else {
+    int const other = nearest.s > T(0) ? 1 : 0;
+    int const end_of_a = of_a ? end : other, end_of_b = of_a ? other : end - 2;
+    r.feature = static_cast<Feature>(static_cast<int>(Feature::a0_b0) + 2 * end_of_a + end_of_b);
+  }
+  return r;
+}
+
+/// Of either kind.
+template <class T>
+KOKKOS_INLINE_FUNCTION ClosestPoints<T> closest_points(PairKind kind, Vec3<T> const (&y)[4]) {
+  return kind == PairKind::edge_edge ? closest_edge_edge(y) : closest_point_triangle(y);
+}
+
+}  // namespace taut
