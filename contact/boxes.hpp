@@ -36,7 +36,7 @@ struct SearchBox {
   float low[3], high[3];
 };
 
-/// Overlaps no box, and leaves every box that it is joined to as it is.
+/// Overlaps no bounded box, and leaves every box that it is joined to as it is.
 KOKKOS_INLINE_FUNCTION SearchBox empty_box() {
   constexpr float infinity = Kokkos::Experimental::infinity_v<float>;
   return {{infinity, infinity, infinity}, {-infinity, -infinity, -infinity}};

@@ -121,6 +121,33 @@ TEMPLATE_TEST_CASE("no search misses a close pair, and all find the same", "[con
   CHECK(close > 50'000);
 }
 
+TEMPLATE_TEST_CASE("where a step ends when it is stored counts", "[contact]",
+                   BruteForce<DefaultSpace>, SpatialHash<DefaultSpace>, Bvh<DefaultSpace>) {
+  // At 7e5 m the numbers of single precision are 1/16 m apart: a point that was to stop 0.093 m
+  // above a triangle stops at 1/16 m.
+  for (int axis = 0; axis < 3; ++axis) {
+    Soup soup;
+    soup.surface = make_surface({{0, 1, 2}, {3, 4, 5}}, std::vector<int>(6, 0));
+    soup.edge_length = 1;
+    soup.radius = 0.07;
+    double const end = 1.49 / 16;
+    for (Point v : {Point{0, 0, 0}, {1, 0, 0}, {0, 1, 0}, {0.2, 0.2, 1}, {1, 0, 3}, {0, 1, 3}}) {
+      Point x, p{0, 0, 0};
+      for (int c = 0; c < 3; ++c) x[(axis + 1 + c) % 3] = v[c];
+      x[axis] += 7e5;
+      if (soup.x.size() == 3) p[axis] = end - 1;
+      soup.x.push_back(x);
+      soup.p.push_back(p);
+    }
+    Pair const pair{PairKind::point_triangle, {3, 0, 1, 2}};
+    REQUIRE(distance(pair, after<Fp32>(soup, 1)) < soup.radius);
+    REQUIRE(distance(pair, after<Fp64>(soup, 1)) > soup.radius);
+    using S = DefaultSpace;
+    CHECK(PairSet(find<TestType>(soup, motion_of<Fp32, S>(soup, 1))).has(pair));
+    CHECK(!PairSet(find<TestType>(soup, motion_of<Fp64, S>(soup, 1))).has(pair));
+  }
+}
+
 TEMPLATE_TEST_CASE("a search finds little more than boxes that are close", "[contact]", Fp64, Mixed,
                    Fp32) {
   using S = DefaultSpace;
