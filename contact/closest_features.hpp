@@ -1,6 +1,6 @@
 // The closest points of the two kinds of pairs that surface meshes have in contact: a vertex and a
 // triangle, two edges. Both are one problem for four vertices y and four coefficients c, whose sum
-// is zero (Shen et al. 2024, section 4.2):
+// is zero (Shen et al. 2024, equation 8):
 //
 //   t = Sum_a c_a y_a,   distance = |t|,   c = (1, -w0, -w1, -w2)         point, triangle
 //                                          c = (1 - s, s, -(1 - u), -u)   edges a0 a1 and b0 b1
@@ -96,9 +96,9 @@ KOKKOS_INLINE_FUNCTION Foot<T> foot_on_segment(Vec3<T> const& b, Vec3<T> const& 
   return {s, t, dot(t, t)};
 }
 
-/// Whether foot `a` is the nearer. Round-off decides between the inside of an edge and its own end,
-/// where the distances agree to second order; there the inside is right, and gives the direction
-/// to full accuracy.
+/// Whether foot `a` is the nearer. Close to an end of an edge, the foot inside it and that end,
+/// which is the foot on a neighbour, have distances that agree to second order: the inside is right
+/// there, and gives the direction to full accuracy, but round-off could prefer the end.
 template <class T>
 KOKKOS_INLINE_FUNCTION bool nearer(Foot<T> const& a, Foot<T> const& b) {
   constexpr T tie = 1 - 16 * Kokkos::Experimental::epsilon_v<T>;
@@ -127,16 +127,13 @@ KOKKOS_INLINE_FUNCTION ClosestPoints<T> closest_point_triangle(Vec3<T> const (&y
     }
   }
   int const from = edge, to = (edge + 1) % 3;
-  ClosestPoints<T> r{nearest.t, Kokkos::sqrt(nearest.t2), {T(1), T(0), T(0), T(0)}, Feature::face};
-  if (nearest.inside()) {
-    r.c[1 + from] = nearest.s - T(1);
-    r.c[1 + to] = -nearest.s;
-    r.feature = static_cast<Feature>(static_cast<int>(Feature::edge_01) + edge);
-  } else {
-    int const vertex = nearest.s > T(0) ? to : from;
-    r.c[1 + vertex] = T(-1);
-    r.feature = static_cast<Feature>(static_cast<int>(Feature::vertex_0) + vertex);
+  ClosestPoints<T> r{nearest.t, sqrt(nearest.t2), {T(1), T(0), T(0), T(0)}, Feature::edge_01};
+  for (int v = 0; v < 3; ++v) {
+    r.c[1 + v] = v == from ? nearest.s - T(1) : (v == to ? -nearest.s : T(0));
   }
+  Feature const first = nearest.inside() ? Feature::edge_01 : Feature::vertex_0;
+  int const which = nearest.inside() || nearest.s == T(0) ? from : to;
+  r.feature = static_cast<Feature>(static_cast<int>(first) + which);
   return r;
 }
 
@@ -162,11 +159,11 @@ KOKKOS_INLINE_FUNCTION ClosestPoints<T> closest_edge_edge(Vec3<T> const (&y)[4])
   bool const of_a = end < 2;
   int const from = of_a ? 2 : 0;
   T const sign = of_a ? T(1) : T(-1);
-  ClosestPoints<T> r{
-      sign * nearest.t, Kokkos::sqrt(nearest.t2), {T(0), T(0), T(0), T(0)}, Feature::edge_edge};
-  r.c[end] = sign;
-  r.c[from] = sign * (nearest.s - T(1));
-  r.c[from + 1] = -sign * nearest.s;
+  ClosestPoints<T> r{sign * nearest.t, sqrt(nearest.t2), {}, Feature::edge_edge};
+  for (int v = 0; v < 4; ++v) {
+    T const other = v == from ? nearest.s - T(1) : (v == from + 1 ? -nearest.s : T(0));
+    r.c[v] = sign * (v == end ? T(1) : other);
+  }
   if (nearest.inside()) {
     r.feature = static_cast<Feature>(static_cast<int>(Feature::a0_b) + end);
   } else {
