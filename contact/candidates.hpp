@@ -1,0 +1,156 @@
+// Candidates for contact: lists of pairs that a search found, as the vertices of each. They live
+// where the kernels run. A list grows when a search finds more than it can hold, and never loses a
+// pair; while nothing grows, nothing is allocated.
+//
+// A list can be cut down to what a filter keeps, in the same order: closeness proper
+// (`CloserThan`), or the paper's exclusion of pairs that are close at rest (activation.hpp).
+#pragma once
+
+#include <taut/contact/closest_features.hpp>
+#include <taut/core/exec/scan.hpp>
+
+#include <limits>
+#include <string>
+#include <utility>
+
+namespace taut {
+
+/// The vertices of each pair: of point_triangle the point and the corners of the triangle, of
+/// edge_edge the ends of an edge and of another, the edge that comes first in the surface first.
+template <class S>
+using PairIds = Kokkos::View<int* [4], typename S::layout, typename S::memory>;
+
+/// Where the vertices of a pair are at `x`.
+template <class Positions>
+KOKKOS_INLINE_FUNCTION void gather(int const (&v)[4], Positions const& x, Vec3<double> (&y)[4]) {
+  for (int a = 0; a < 4; ++a)
+    for (int c = 0; c < 3; ++c) y[a][c] = double(x(v[a], c));
+}
+
+namespace kernels {
+
+template <class Ids>
+KOKKOS_INLINE_FUNCTION void read_pair(Ids const& ids, std::int64_t k, int (&v)[4]) {
+  for (int a = 0; a < 4; ++a) v[a] = ids(k, a);
+}
+template <class Ids>
+KOKKOS_INLINE_FUNCTION void write_pair(int const (&v)[4], Ids const& ids, std::int64_t k) {
+  for (int a = 0; a < 4; ++a) ids(k, a) = v[a];
+}
+
+/// Whether pair k is kept, as 1 or 0.
+template <PairKind kind, class S, class Positions, class Filter>
+struct JudgePairs {
+  PairIds<S> ids;
+  Positions x;
+  Filter filter;
+  Kokkos::View<int*, typename S::memory> kept;
+  KOKKOS_FUNCTION void operator()(int k) const {
+    int v[4];
+    Vec3<double> y[4];
+    read_pair(ids, k, v);
+    gather(v, x, y);
+    kept(k) = filter(kind, v, y) ? 1 : 0;
+  }
+};
+
+/// Moves pair k to place(k), if the next one has another place.
+template <class S>
+struct MovePairs {
+  PairIds<S> from;
+  Kokkos::View<int const*, typename S::memory> place;
+  PairIds<S> to;
+  int count, kept;
+  KOKKOS_FUNCTION void operator()(int k) const {
+    int const next = k + 1 < count ? place(k + 1) : kept;
+    if (next == place(k)) return;
+    int v[4];
+    read_pair(from, k, v);
+    write_pair(v, to, place(k));
+  }
+};
+
+}  // namespace kernels
+
+/// A list of pairs of one kind.
+template <PairKind kind, class S>
+class CandidateList {
+public:
+  int count() const { return count_; }
+  /// `count()` pairs. Valid until the list is changed.
+  PairIds<S> ids() const { return PairIds<S>(ids_, Kokkos::make_pair(0, count_), Kokkos::ALL); }
+
+  /// Makes room for `count` pairs and takes them for the list; what was in it is lost. Throws Error
+  /// if there are more than an int can count.
+  void resize(std::int64_t count) {
+    if (count > std::numeric_limits<int>::max()) {
+      throw Error(
+          "contact: {} candidate pairs are more than a list can hold: search within a smaller "
+          "radius, or look for a vertex that has flown off",
+          count);
+    }
+    grow(ids_, "candidates", count);
+    count_ = static_cast<int>(count);
+  }
+
+  /// Leaves the pairs for which `filter(kind, v, y)` says so; v are the vertices of a pair and y is
+  /// where these are at `x`.
+  template <class Filter, class Positions>
+  void keep(Filter const& filter, Positions const& x) {
+    grow(place_, "candidate_place", count_);
+    grow(spare_, "candidates", count_);
+    for_each<S>("candidates_judge", count_,
+                kernels::JudgePairs<kind, S, Positions, Filter>{ids_, x, filter, place_});
+    Kokkos::View<int*, typename S::memory> const place(place_, Kokkos::make_pair(0, count_));
+    int const kept = exclusive_scan<S, int>("candidates_place", place);
+    for_each<S>("candidates_move", count_,
+                kernels::MovePairs<S>{ids_, place, spare_, count_, kept});
+    std::swap(ids_, spare_);
+    count_ = kept;
+  }
+
+private:
+  /// Half as much again as asked for, so that a list that grows slowly is seldom moved.
+  template <class View>
+  static void grow(View& view, char const* name, std::int64_t count) {
+    if (view.extent(0) >= static_cast<std::size_t>(count)) return;
+    view = View();  // the old memory first
+    view = View(Kokkos::view_alloc(Kokkos::WithoutInitializing, std::string(name)),
+                static_cast<std::size_t>(count + count / 2));
+  }
+
+  PairIds<S> ids_, spare_;
+  Kokkos::View<int*, typename S::memory> place_;
+  int count_ = 0;
+};
+
+/// What a search finds.
+template <class S>
+struct Candidates {
+  CandidateList<PairKind::point_triangle, S> point_triangle;
+  CandidateList<PairKind::edge_edge, S> edge_edge;
+
+  template <class Filter, class Positions>
+  void keep(Filter const& filter, Positions const& x) {
+    point_triangle.keep(filter, x);
+    edge_edge.keep(filter, x);
+  }
+};
+
+/// Keeps what is closer than `radius`, m, give or take the round-off of the distance: nothing that
+/// is closer by arithmetic in `Real` is lost.
+template <class Real>
+struct CloserThan {
+  double radius;
+
+  KOKKOS_FUNCTION bool operator()(PairKind kind, int const (&)[4],
+                                  Vec3<double> const (&y)[4]) const {
+    double size = 0;
+    for (int a = 1; a < 4; ++a) size += norm(y[a] - y[0]);
+    // 4 epsilon (|b| + |e1| + |e2|) of closest_features.hpp; the sum is 3 sizes at most.
+    constexpr double budget = 16 * Kokkos::Experimental::epsilon_v<Real>;
+    return closest_points(kind, y).distance < radius + budget * size;
+  }
+};
+
+}  // namespace taut
