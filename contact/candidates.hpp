@@ -19,6 +19,9 @@ namespace taut {
 /// edge_edge the ends of an edge and of another, the edge that comes first in the surface first.
 template <class S>
 using PairIds = Kokkos::View<int* [4], typename S::layout, typename S::memory>;
+/// The same, to read.
+template <class S>
+using PairList = Kokkos::View<int const* [4], typename S::layout, typename S::memory>;
 
 /// Where the vertices of a pair are at `x`.
 template <class Positions>

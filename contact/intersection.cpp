@@ -75,18 +75,6 @@ std::int32_t body_of(std::array<std::int32_t, n> const& simplex,
 
 }  // namespace
 
-std::vector<Edge> edges_of(std::span<Triangle const> triangles) {
-  std::vector<Edge> edges;
-  for (Triangle const& t : triangles)
-    for (std::size_t k = 0; k < 3; ++k) {
-      std::int32_t const a = t[k], b = t[(k + 1) % 3];
-      edges.push_back({std::min(a, b), std::max(a, b)});
-    }
-  std::sort(edges.begin(), edges.end());
-  edges.erase(std::unique(edges.begin(), edges.end()), edges.end());
-  return edges;
-}
-
 std::string Intersection::text(std::span<std::string const> names) const {
   const auto name = [&](std::int32_t body) { return names[body]; };
   std::string const at = fmt::format("({:.6g}, {:.6g}, {:.6g})", place[0], place[1], place[2]);

@@ -23,17 +23,12 @@
 
 namespace taut {
 
-using Edge = std::array<std::int32_t, 2>;
-
 /// What may intersect. Bodies count from 0; a triangle or edge is of the body of its vertices.
 struct IntersectionMesh {
   std::vector<Triangle> triangles;  ///< of closed bodies: counter-clockwise seen from outside
   std::vector<Edge> edges;          ///< those of the triangles, and any others
   std::vector<std::int32_t> body;   ///< per vertex
 };
-
-/// The edges of the triangles, once each, ascending, the smaller vertex first.
-std::vector<Edge> edges_of(std::span<Triangle const> triangles);
 
 struct Intersection {
   IntersectionKind kind;

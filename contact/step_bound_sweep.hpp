@@ -6,14 +6,11 @@
 // reserve) / 2 since: their distance changes by at most twice the longest motion of a vertex.
 #pragma once
 
+#include <taut/contact/candidates.hpp>
 #include <taut/contact/vertex_bound.hpp>
 #include <taut/core/exec/parallel.hpp>
 
 namespace taut {
-
-/// The four vertices of each pair, in the order of `PairKind`.
-template <class S>
-using PairList = Kokkos::View<int const* [4], typename S::layout, typename S::memory>;
 
 /// The shortest bound of a list, and how its pairs were settled.
 struct BoundedStep {

@@ -87,11 +87,7 @@ Surface make_surface(std::vector<Triangle> triangles, std::vector<int> object) {
   for (std::size_t v = 0; v < used.size(); ++v) {
     if (used[v]) surface.vertices.push_back(static_cast<std::int32_t>(v));
   }
-  for (Side const& side : sorted_sides(triangles)) {
-    if (surface.edges.empty() || surface.edges.back() != side.edge) {
-      surface.edges.push_back(side.edge);
-    }
-  }
+  surface.edges = edges_of(triangles);
   surface.triangles = std::move(triangles);
   surface.object = std::move(object);
   return surface;

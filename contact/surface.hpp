@@ -13,8 +13,6 @@
 
 namespace taut {
 
-using Edge = std::array<std::int32_t, 2>;
-
 struct Surface {
   std::vector<std::int32_t> vertices;  ///< of the triangles, ascending
   std::vector<Edge> edges;             ///< each once, lower vertex first, in lexicographic order

@@ -35,8 +35,7 @@ void for_each(char const* name, int n, Functor const& functor) {
                        functor);
 }
 
-/// Kokkos::parallel_reduce into a number on the host, for reductions whose order is free. Into a
-/// view, because into a plain number Kokkos makes a string for the name of its fence each time.
+/// Kokkos::parallel_reduce into a number on the host, for reductions whose order is free.
 template <class S, template <class, class> class Join, class T, class Policy, class Functor>
 T reduce(char const* name, Policy const& policy, Functor const& functor) {
   T result;
@@ -46,21 +45,63 @@ T reduce(char const* name, Policy const& policy, Functor const& functor) {
   return result;
 }
 
+namespace kernels {
+
+/// What a functor makes of `start` over one run of a loop.
+template <class T, class Functor>
+struct FoldRun {
+  Functor functor;
+  T start;
+  T* to;
+  int n, length;
+  KOKKOS_FUNCTION void operator()(int r) const {
+    T value = start;
+    int const first = r * length, last = first + Kokkos::min(length, n - first);
+    for (int i = first; i < last; ++i) functor(i, value);
+    to[r] = value;
+  }
+};
+
+/// Folds [0, n) in up to `runs` runs on the host, on the stack: Kokkos would make a string for the
+/// name of a fence in each reduction.
+template <class S, class T, class Functor, class Join>
+T fold(char const* name, int n, T start, Functor const& functor, Join const& join) {
+  constexpr int runs = 256;
+  T part[runs];
+  int const length = n / runs + 1, count = n / length + (n % length > 0);
+  for_each<S>(name, count, FoldRun<T, Functor>{functor, start, part, n, length});
+  S::instance().fence(label(name));
+  for (int r = 0; r < count; ++r) start = join(start, part[r]);
+  return start;
+}
+
+}  // namespace kernels
+
 /// Calls `functor(i, largest)` for i in [0, n), where `functor` raises `largest`; returns it, or
 /// `floor` if n = 0. A maximum is exact, so its order is free.
 template <class S, class T, class Functor>
 T maximum(char const* name, int n, T floor, Functor const& functor) {
-  if (n == 0) return floor;
-  Kokkos::RangePolicy<typename S::execution> const all(S::instance(), 0, n);
-  return Kokkos::max(reduce<S, Kokkos::Max, T>(name, all, functor), floor);
+  if constexpr (S::on_host) {
+    return kernels::fold<S>(name, n, floor, functor,
+                            [](T const& a, T const& b) { return Kokkos::max(a, b); });
+  } else {
+    if (n == 0) return floor;
+    Kokkos::RangePolicy<typename S::execution> const all(S::instance(), 0, n);
+    return Kokkos::max(reduce<S, Kokkos::Max, T>(name, all, functor), floor);
+  }
 }
 
 /// As `maximum`, for the smallest.
 template <class S, class T, class Functor>
 T minimum(char const* name, int n, T ceiling, Functor const& functor) {
-  if (n == 0) return ceiling;
-  Kokkos::RangePolicy<typename S::execution> const all(S::instance(), 0, n);
-  return Kokkos::min(reduce<S, Kokkos::Min, T>(name, all, functor), ceiling);
+  if constexpr (S::on_host) {
+    return kernels::fold<S>(name, n, ceiling, functor,
+                            [](T const& a, T const& b) { return Kokkos::min(a, b); });
+  } else {
+    if (n == 0) return ceiling;
+    Kokkos::RangePolicy<typename S::execution> const all(S::instance(), 0, n);
+    return Kokkos::min(reduce<S, Kokkos::Min, T>(name, all, functor), ceiling);
+  }
 }
 
 /// K sums that are accumulated side by side.

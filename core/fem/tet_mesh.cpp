@@ -36,4 +36,16 @@ std::vector<Triangle> boundary_faces(std::vector<Tet> const& tets) {
   return boundary;
 }
 
+std::vector<Edge> edges_of(std::span<Triangle const> triangles) {
+  std::vector<Edge> edges;
+  for (Triangle const& t : triangles)
+    for (std::size_t k = 0; k < 3; ++k) {
+      std::int32_t const a = t[k], b = t[(k + 1) % 3];
+      edges.push_back({std::min(a, b), std::max(a, b)});
+    }
+  std::sort(edges.begin(), edges.end());
+  edges.erase(std::unique(edges.begin(), edges.end()), edges.end());
+  return edges;
+}
+
 }  // namespace taut

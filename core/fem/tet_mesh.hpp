@@ -3,6 +3,7 @@
 
 #include <array>
 #include <cstdint>
+#include <span>
 #include <vector>
 
 namespace taut {
@@ -10,6 +11,7 @@ namespace taut {
 using Point = std::array<double, 3>;
 using Tet = std::array<std::int32_t, 4>;
 using Triangle = std::array<std::int32_t, 3>;
+using Edge = std::array<std::int32_t, 2>;
 
 struct TetMesh {
   std::vector<Point> points;  ///< metres
@@ -24,5 +26,8 @@ struct TriangleMesh {
 /// The faces that belong to exactly one tet, oriented outward for positively oriented tets. Vertex
 /// indices are those of the tet mesh.
 std::vector<Triangle> boundary_faces(std::vector<Tet> const& tets);
+
+/// The edges of the triangles: each once, the smaller vertex first, in lexicographic order.
+std::vector<Edge> edges_of(std::span<Triangle const> triangles);
 
 }  // namespace taut
