@@ -184,10 +184,12 @@ private:
     Activation<Space> activation;
     Bound_ bound;
     Clearance clearance;
-    double portion;  ///< m
+    static constexpr double growth = 4;  ///< of the portions of a motion
+    double portion;                      ///< the first of them, m
     // Two, for those of a long motion are many: they would burden every evaluation after it.
-    Cache near;   ///< for energies
-    Cache swept;  ///< for bounds
+    Cache near;            ///< for energies
+    Cache swept;           ///< for bounds
+    double swept_for = 0;  ///< motion of its last search, m
     Table table;
     double limit = 0;
     PairKind limiting_kind = PairKind::point_triangle;
@@ -242,18 +244,23 @@ private:
         throw Error("contact: a step by a vector that is not finite: look for what made it");
       }
       if (motion == 0) return at_most;
-      constexpr double growth = 4, far = 1 << 14;
+      // The candidates of a motion much longer than this one would burden the bound as well.
+      if (swept_for > growth * std::max(portion, at_most * motion)) swept.forget();
+      constexpr double far = 1 << 14;
       for (double reach = portion;; reach *= growth) {
         double const length = std::min(at_most, reach / motion);
-        double const alpha = bounded(x, p, length);
+        double const alpha = bounded(x, p, length, motion);
         if (alpha < length || length == at_most) return alpha;
         if (!std::isfinite(at_most) && reach >= far * portion) return alpha;
       }
     }
 
-    /// The bound of a step of at most `length`.
-    double bounded(Positions const& x, Vectors const& p, double length) {
-      if (swept.update({x, p, length, fixed}) == Touch::impossible) return length;
+    /// The bound of a step of at most `length`, that is by `length` times `motion` metres.
+    double bounded(Positions const& x, Vectors const& p, double length, double motion) {
+      std::int64_t const searches = swept.counters().searches;
+      Touch const touch = swept.update({x, p, length, fixed});
+      if (swept.counters().searches > searches) swept_for = length * motion;
+      if (touch == Touch::impossible) return length;
       double const first = bounded_by(swept.candidates().point_triangle, x, p, length);
       return first > 0 ? bounded_by(swept.candidates().edge_edge, x, p, first) : first;
     }
