@@ -43,7 +43,7 @@ struct Reach {
 /// A policy, on a path P. `certify` is the cheap part of `bound`: what it leaves open, `bound` may
 /// decide, and at a higher price in a wider scalar.
 template <class B, class P>
-concept StepBound = GapPath<P> &&
+concept GapBound = GapPath<P> &&
     requires(B const& b, P const& path, Clearance const& clearance, typename P::Scalar at_most) {
   { b.certify(path, clearance, at_most) } -> std::same_as<Reach<typename P::Scalar>>;
   { b.bound(path, clearance, at_most) } -> std::same_as<Reach<typename P::Scalar>>;

@@ -82,8 +82,8 @@ struct BoundPairs : BoundReduction {
   /// Compiled once: inlined into several loops, it could be contracted to other fused products in
   /// each, and a bound would depend on whether its loop runs in parallel.
   [[gnu::noinline]] KOKKOS_FUNCTION Reach<double> reach(int k) const {
-    static_assert(StepBound<Bound, PairPath<double, kind>>,
-                  "a step bound needs certify and bound: see StepBound in step_bound.hpp");
+    static_assert(GapBound<Bound, PairPath<double, kind>>,
+                  "a step bound needs certify and bound: see GapBound in step_bound.hpp");
     if constexpr (!std::is_same_v<Real, double>) {
       // What is certified for a little more than at_most is certified for it.
       Real const more = static_cast<Real>(at_most) * (1 + budget<Real>);

@@ -36,7 +36,7 @@ Reach<T> bound_of(PairMotion const& m, Bound const& bound, Clearance const& clea
   return with_path<Position, Real>(m, [&](auto const& x, auto const& p) {
     if (m.kind == PairKind::point_triangle) {
       PairPath<T, PairKind::point_triangle> const path(x, p);
-      static_assert(StepBound<Bound, PairPath<T, PairKind::point_triangle>>);
+      static_assert(GapBound<Bound, PairPath<T, PairKind::point_triangle>>);
       return bound.bound(path, clearance, at_most);
     }
     PairPath<T, PairKind::edge_edge> const path(x, p);

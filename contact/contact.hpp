@@ -1,0 +1,313 @@
+// Contact between surfaces: a swept term of the potential,
+//
+//   V(x) = Sum over pairs K m(q) b(d),   a point and a triangle, or two edges, at the distance d,
+//
+// with barrier, curvature and mollifier of a PairEnergy (pair.hpp), the pairs that a cache proves
+// complete (candidate_cache.hpp), a step bound (step_bound.hpp) and a stiffness rule
+// (stiffness.hpp). Li et al. 2020, "Incremental Potential Contact"; Shen et al. 2024.
+//
+// No step may be longer than max_step says: then nothing crosses that had not crossed before.
+#pragma once
+
+#include <taut/contact/candidate_cache.hpp>
+#include <taut/contact/contact_pairs.hpp>
+#include <taut/contact/spatial_hash.hpp>
+#include <taut/contact/step_bound_sweep.hpp>
+#include <taut/core/potential/term.hpp>
+
+#include <array>
+#include <cmath>
+#include <memory>
+#include <optional>
+#include <vector>
+
+namespace taut {
+
+/// What contact amounts to at some positions.
+struct ContactReport {
+  int candidates = 0;       ///< pairs that were looked at
+  int contacts = 0;         ///< of these, pairs that act
+  double smallest_gap = 1;  ///< least distance over activation distance (dhat between bodies)
+};
+
+/// The pair that a step bound stopped at.
+struct LimitingPair {
+  PairKind kind;
+  std::array<int, 4> vertices;  ///< in the order of `kind`
+  double alpha;  ///< the bound; 0: the gap is nil or not above round-off, no step is proved safe
+};
+
+template <class Pair_ = PairEnergy<>, class Search_ = SpatialHash<DefaultSpace>,
+          class Bound_ = AdditiveCcd, class Stiffness_ = GivenStiffness, class Precision_ = Mixed,
+          class Space_ = typename Search_::Space>
+class Contact {
+public:
+  using Pair = Pair_;
+  using Space = Space_;
+  using Precision = Precision_;
+  using Real = typename Precision::real;
+  using Positions = VectorField<typename Precision::position, Space>;
+  using Vectors = VectorField<Real, Space>;
+  using Blocks = BlockField<Real, Space>;
+  using Matrix = BlockCsr<Space, double>;
+  using Fixed = FixedMask<Space>;
+  using Cache = CandidateCache<Search_, Precision>;
+
+  static_assert(std::same_as<typename Search_::Space, Space>,
+                "taut: the search of a Contact must live in its Space");
+  static_assert(StiffnessRule<Stiffness_, Precision, Space>,
+                "taut: the stiffness of a Contact must satisfy StiffnessRule "
+                "(contact/stiffness.hpp)");
+  static_assert(GapBound<Bound_, PairPath<double, PairKind::edge_edge>>,
+                "taut: the bound of a Contact must satisfy GapBound (contact/step_bound.hpp)");
+
+  struct Params {
+    std::optional<double> dhat = {};  ///< m; else 0.3 of the mean edge of the surface at rest
+    double cap = 0.5;  ///< of the distance at rest, for pairs of one body (activation.hpp)
+    Stiffness_ stiffness = {};
+    double mollifier_threshold = EdgeMollifier::default_threshold;
+    Bound_ bound = {};
+    /// As line searches and predictors go half of max_step at most, steps use up half of a gap.
+    Clearance clearance = {.share = 0.9};
+    typename Cache::Params search = {};
+  };
+
+  /// `rest`: where the vertices are at rest, m, one per unknown. Pairs whose vertices are all fixed
+  /// in `unknowns` are left alone. Copies share everything: they are one contact. Throws Error
+  /// where something does not fit or has no size.
+  Contact(Unknowns<Precision, Space> const& unknowns, Surface const& surface,
+          std::vector<Point> const& rest, Params const& params)
+      : state_(std::make_shared<State>(unknowns, surface, rest, params)) {}
+
+  double value(Positions const& x, double scale) const {
+    if (!state_->complete({x, {}, 0, state_->fixed})) return 0;
+    using Kernel = kernels::PairValue<Pair, Precision, Space>;
+    return scale * state_->table.sum("contact_value", Kernel{pairs(), x});
+  }
+  double change(Positions const& x, Vectors const& p, double alpha, double scale) const {
+    if (!state_->complete({x, p, alpha, state_->fixed})) return 0;
+    using Kernel = kernels::PairChange<Pair, Precision, Space>;
+    return scale * state_->table.sum("contact_change", Kernel{pairs(), x, p, alpha});
+  }
+  double quadratic_form(Positions const& x, Vectors const& p, double scale) const {
+    if (!state_->complete({x, {}, 0, state_->fixed})) return 0;
+    using Kernel = kernels::PairForm<Pair, Precision, Space>;
+    return scale * state_->table.sum("contact_form", Kernel{pairs(), x, p});
+  }
+
+  void add_gradient(Positions const& x, double scale, Fixed const& fixed, Vectors const& g) const {
+    gradient<0>(x, scale, fixed, g, g);
+  }
+  void add_gradient(Positions const& x, double scale, Fixed const& fixed, Vectors const& g,
+                    Vectors const& diagonal) const {
+    gradient<3>(x, scale, fixed, g, diagonal);
+  }
+  void add_gradient(Positions const& x, double scale, Fixed const& fixed, Vectors const& g,
+                    Blocks const& blocks) const {
+    gradient<6>(x, scale, fixed, g, blocks);
+  }
+  double add_gradient_after(Positions const& x, Vectors const& p, double alpha, double scale,
+                            Fixed const& fixed, Vectors const& g) const {
+    return gradient_after<0>(x, p, alpha, scale, fixed, g, g);
+  }
+  double add_gradient_after(Positions const& x, Vectors const& p, double alpha, double scale,
+                            Fixed const& fixed, Vectors const& g, Vectors const& diagonal) const {
+    return gradient_after<3>(x, p, alpha, scale, fixed, g, diagonal);
+  }
+  double add_gradient_after(Positions const& x, Vectors const& p, double alpha, double scale,
+                            Fixed const& fixed, Vectors const& g, Blocks const& blocks) const {
+    return gradient_after<6>(x, p, alpha, scale, fixed, g, blocks);
+  }
+
+  void add_product(Positions const& x, Vectors const& p, double scale, Fixed const& fixed,
+                   Vectors const& hp) const {
+    if (!state_->complete({x, {}, 0, state_->fixed})) return;
+    using Kernel = kernels::PairProduct<Pair, Precision, Space>;
+    auto const slots = state_->table.slots(0);
+    for_each<Space>("contact_product", pairs().count, Kernel{pairs(), x, p, fixed, slots});
+    state_->table.template gather<0>(slots, scale, fixed, hp, hp);
+  }
+
+  /// Throws Error, before it writes anything, if the matrix was made when other pairs were
+  /// candidates and lacks a block that is not zero: then its pattern must be made anew.
+  void add_to(Matrix const& matrix, Positions const& x, double scale, Fixed const& fixed) const {
+    if (!state_->complete({x, {}, 0, state_->fixed})) return;
+    state_->table.check_pattern(matrix, x, fixed);
+    state_->table.assemble(matrix, x, scale, fixed);
+  }
+  /// The pairs that are candidates now, in memory that lasts until they are asked for again. As
+  /// bodies move others become candidates, so a pattern made of them serves for a while only.
+  void elements(std::vector<Connectivity>& kinds) const {
+    kinds.push_back({state_->table.elements(), 4});
+  }
+
+  /// What `bound` certifies for all pairs, no more than `at_most`; 0 if the gap of a pair is nil or
+  /// not above round-off. Motion is proved in portions, so that a long one that is soon cut is not
+  /// searched to its end; of a step without end (at_most infinite) a finite part.
+  double max_step(Positions const& x, Vectors const& p, double at_most) const {
+    return state_->max_step(x, p, at_most);
+  }
+  /// The same: what is pinned may not cross anything either.
+  double max_prescribed_step(Positions const& x, Vectors const& p, double at_most) const {
+    return state_->max_step(x, p, at_most);
+  }
+  /// The pair that the last max_step was cut by; none if it was not.
+  std::optional<LimitingPair> limiting_pair() const { return state_->limiting_pair(); }
+
+  /// For rules that need it: one entry per vertex, N/m; the values are taken over now. To be set
+  /// between steps, for the energy is another function afterwards. Throws Error for another length.
+  void set_vertex_stiffness(Array<Real, Space> const& stiffness) {
+    state_->set_vertex_stiffness(stiffness);
+  }
+  /// To be called where other unknowns have become fixed or free.
+  void fixed_changed() { state_->forget(); }
+
+  double dhat() const { return state_->activation.dhat; }
+  /// Searches, and the calls that did without: for energies, and for bounds.
+  CacheCounters const& energy_counters() const { return state_->near.counters(); }
+  CacheCounters const& bound_counters() const { return state_->swept.counters(); }
+  ContactReport report(Positions const& x) const {
+    ContactReport r;
+    if (!state_->complete({x, {}, 0, state_->fixed})) return r;
+    r.candidates = pairs().count;
+    r.contacts = state_->table.contacts(x);
+    r.smallest_gap = state_->table.smallest_gap(x);
+    return r;
+  }
+
+private:
+  using Table = ContactPairs<Pair, Stiffness_, Precision, Space>;
+
+  struct State {
+    Fixed fixed;
+    SurfaceViews<Space> surface;
+    Activation<Space> activation;
+    Bound_ bound;
+    Clearance clearance;
+    static constexpr double growth = 4;  ///< of the portions of a motion
+    double portion;                      ///< the first of them, m
+    // Two, for those of a long motion are many: they would burden every evaluation after it.
+    Cache near;            ///< for energies
+    Cache swept;           ///< for bounds
+    double swept_for = 0;  ///< motion of its last search, m
+    Table table;
+    double limit = 0;
+    PairKind limiting_kind = PairKind::point_triangle;
+    bool limited = false;
+    Kokkos::View<int[4], typename Space::memory> limiting{"contact_limiting"};
+
+    State(Unknowns<Precision, Space> const& unknowns, Surface const& host,
+          std::vector<Point> const& rest, Params const& params)
+        : fixed(unknowns.fixed), bound(params.bound), clearance(params.clearance) {
+      if (rest.size() != host.object.size() || rest.size() != std::size_t(unknowns.size())) {
+        throw Error(
+            "contact: {} positions at rest, a surface over {} vertices and {} unknowns: give as "
+            "many of each",
+            rest.size(), host.object.size(), unknowns.size());
+      }
+      EdgeLengths const edges = edge_lengths(host, rest);
+      if (!(edges.min > 0)) {
+        throw Error("contact: a surface without edges, or with one of length zero: remove it");
+      }
+      surface = copy_surface<Space>(host);
+      portion = edges.mean;
+      activation = {params.dhat.value_or(0.3 * edges.mean), params.cap,
+                    copy_points<Space>("contact_rest", rest), surface.object};
+      near = Cache(surface, edges.mean, activation, params.search);
+      swept = Cache(surface, edges.mean, activation, params.search);
+      table = Table(surface, activation, params.stiffness, params.mollifier_threshold,
+                    vertex_areas(host, rest), fixed);
+      kernels::check_clearance(clearance, 1);
+    }
+
+    /// Makes the table complete for a motion; false if nothing acts in it.
+    bool complete(Motion<Precision, Space> const& motion) {
+      if (near.update(motion) == Touch::impossible) return false;
+      table.take(near.candidates(), near.counters().searches);
+      return table.pairs().count > 0;
+    }
+    void forget() {
+      near.forget();
+      swept.forget();
+    }
+    void set_vertex_stiffness(Array<Real, Space> const& stiffness) {
+      table.set_vertex_stiffness(stiffness);
+    }
+
+    double max_step(Positions const& x, Vectors const& p, double at_most) {
+      limited = false;
+      if (!(at_most > 0)) return at_most;
+      using Largest = kernels::LargestMotion<Precision, Space>;
+      double const motion =
+          2 * maximum<Space>("contact_motion", surface.vertices(), 0.0, Largest{surface.vertex, p});
+      if (!std::isfinite(motion)) {
+        throw Error("contact: a step by a vector that is not finite: look for what made it");
+      }
+      if (motion == 0) return at_most;
+      // The candidates of a motion much longer than this one would burden the bound as well.
+      if (swept_for > growth * std::max(portion, at_most * motion)) swept.forget();
+      constexpr double far = 1 << 14;
+      for (double reach = portion;; reach *= growth) {
+        double const length = std::min(at_most, reach / motion);
+        double const alpha = bounded(x, p, length, motion);
+        if (alpha < length || length == at_most) return alpha;
+        if (!std::isfinite(at_most) && reach >= far * portion) return alpha;
+      }
+    }
+
+    /// The bound of a step of at most `length`, that is by `length` times `motion` metres.
+    double bounded(Positions const& x, Vectors const& p, double length, double motion) {
+      std::int64_t const searches = swept.counters().searches;
+      Touch const touch = swept.update({x, p, length, fixed});
+      if (swept.counters().searches > searches) swept_for = length * motion;
+      if (touch == Touch::impossible) return length;
+      double const first = bounded_by(swept.candidates().point_triangle, x, p, length);
+      return first > 0 ? bounded_by(swept.candidates().edge_edge, x, p, first) : first;
+    }
+    template <PairKind kind>
+    double bounded_by(CandidateList<kind, Space> const& list, Positions const& x, Vectors const& p,
+                      double length) {
+      BoundedStep const step = bound_step<Precision, Space, kind>(
+          bound, clearance, PairList<Space>(list.ids()), list.count(), x, p, length);
+      if (step.pair < 0) return length;
+      limited = true;
+      limit = step.alpha;
+      limiting_kind = kind;
+      for_each<Space>("contact_limiting", 1,
+                      kernels::KeepPair<Space>{list.ids(), step.pair, limiting});
+      return step.alpha;
+    }
+    std::optional<LimitingPair> limiting_pair() const {
+      if (!limited) return {};
+      auto const host = Kokkos::create_mirror_view_and_copy(Kokkos::HostSpace(), limiting);
+      return LimitingPair{limiting_kind, {host(0), host(1), host(2), host(3)}, limit};
+    }
+  };
+
+  kernels::PairTable<Precision, Space> const& pairs() const { return state_->table.pairs(); }
+
+  template <int numbers, class CurvatureField>
+  void gradient(Positions const& x, double scale, Fixed const& fixed, Vectors const& g,
+                CurvatureField const& c) const {
+    if (!state_->complete({x, {}, 0, state_->fixed})) return;
+    using Kernel = kernels::PairGradient<Pair, Precision, Space, numbers>;
+    auto const slots = state_->table.slots(numbers);
+    for_each<Space>("contact_gradient", pairs().count, Kernel{{pairs(), x, {}, 0, slots}});
+    state_->table.template gather<numbers>(slots, scale, fixed, g, c);
+  }
+  template <int numbers, class CurvatureField>
+  double gradient_after(Positions const& x, Vectors const& p, double alpha, double scale,
+                        Fixed const& fixed, Vectors const& g, CurvatureField const& c) const {
+    if (!state_->complete({x, p, -alpha, state_->fixed})) return 0;
+    using Kernel = kernels::PairGradientAfter<Pair, Precision, Space, numbers>;
+    auto const slots = state_->table.slots(numbers);
+    double const change =
+        state_->table.sum("contact_gradient_after", Kernel{{pairs(), x, p, alpha, slots}});
+    state_->table.template gather<numbers>(slots, scale, fixed, g, c);
+    return scale * change;
+  }
+
+  std::shared_ptr<State> state_;
+};
+
+}  // namespace taut

@@ -1,0 +1,404 @@
+// The kernels of the contact term: one sweep over pairs, then one over vertices.
+//
+// A pair that acts leaves what it adds to each of its four vertices in slots of its own, 4 k + a;
+// a vertex adds up its slots in their order. So nothing is atomic, and sums do not depend on the
+// number of threads. What does arithmetic is compiled once ([[gnu::noinline]]): inlined into the
+// serial and the parallel copy of a loop, it could be contracted to other fused products in each.
+#pragma once
+
+#include <taut/contact/activation.hpp>
+#include <taut/contact/pair.hpp>
+#include <taut/contact/stiffness.hpp>
+
+#include <type_traits>
+
+namespace taut::kernels {
+
+/// Pairs with all that does not change while they are candidates: those of points and triangles
+/// first, then those of edges.
+template <class Precision, class S>
+struct PairTable {
+  using Real = typename Precision::real;
+  PairIds<S> vertex;
+  Array<Real, S> stiffness, activation, mollifier;
+  int point_triangles = 0, count = 0;
+
+  KOKKOS_FUNCTION PairKind kind(int k) const {
+    return k < point_triangles ? PairKind::point_triangle : PairKind::edge_edge;
+  }
+  KOKKOS_FUNCTION PairParameters<Real> parameters(int k) const {
+    return {stiffness(k), activation(k), mollifier(k)};
+  }
+  /// Where the vertices of pair k are at x + alpha p, and alpha p.
+  KOKKOS_FUNCTION void read(int k, VectorField<typename Precision::position, S> const& x,
+                            Vec3<double> (&y)[4]) const {
+    for (int a = 0; a < 4; ++a)
+      for (int c = 0; c < 3; ++c) y[a][c] = double(x(vertex(k, a), c));
+  }
+  KOKKOS_FUNCTION void read_step(int k, VectorField<Real, S> const& p, double alpha,
+                                 Vec3<double> (&step)[4]) const {
+    for (int a = 0; a < 4; ++a)
+      for (int c = 0; c < 3; ++c) step[a][c] = alpha * double(p(vertex(k, a), c));
+  }
+};
+
+/// Which slots belong to which vertex.
+template <class S>
+struct SlotsOfVertices {
+  Kokkos::View<int*, typename S::memory> begin, slot;
+};
+
+/// Takes over the candidates of one kind as pairs `first`, `first` + 1, ...
+template <class Pair, class Rule, class Precision, class S>
+struct TakeCandidates {
+  using Real = typename Precision::real;
+  PairKind kind;
+  int first;
+  PairIds<S> ids;
+  Activation<S> activation;
+  Rule rule;
+  StiffnessFields<Precision, S> fields;
+  double mollifier_threshold;
+  PairTable<Precision, S> pairs;
+  Kokkos::View<int*, typename S::memory> vertex_of_slot;
+
+  KOKKOS_FUNCTION void operator()(int i) const { take(i, first + i); }
+  [[gnu::noinline]] KOKKOS_FUNCTION void take(int i, int k) const {
+    int v[4];
+    Vec3<double> rest[4];
+    read_pair(ids, i, v);
+    write_pair(v, pairs.vertex, k);
+    gather(v, activation.rest, rest);
+    for (int a = 0; a < 4; ++a) vertex_of_slot(4 * k + a) = v[a];
+    pairs.activation(k) = static_cast<Real>(activation(kind, v));
+    pairs.stiffness(k) = static_cast<Real>(rule(fields, kind, v));
+    pairs.mollifier(k) = kind == PairKind::edge_edge
+                             ? static_cast<Real>(Pair::Mollifier::scale(rest, mollifier_threshold))
+                             : Real(0);
+  }
+};
+
+template <class Pair, class Precision, class S>
+struct PairValue {
+  PairTable<Precision, S> pairs;
+  VectorField<typename Precision::position, S> x;
+  [[gnu::noinline]] KOKKOS_FUNCTION double value(int k) const {
+    Vec3<double> y[4];
+    pairs.read(k, x, y);
+    auto const s = Pair::evaluate(pairs.kind(k), pairs.parameters(k), y);
+    return s.at.distance < s.activation ? double(Pair::value(s)) : 0;
+  }
+  KOKKOS_FUNCTION void operator()(int k, Sums<double, 1>& sum) const { sum[0] += value(k); }
+};
+
+/// The change of energy by the step that has led to the state `after`; 0 if no pair within it acts.
+template <class Pair, class T>
+KOKKOS_INLINE_FUNCTION double change_of_pair(PairKind kind, PairParameters<T> const& parameters,
+                                             PairState<T> const& after,
+                                             Vec3<double> const (&step)[4]) {
+  Vec3<T> moved[4];
+  T longest = T(0);  // against vertex 1; two vertices move against each other by twice that at most
+  for (int a = 0; a < 4; ++a) {
+    for (int c = 0; c < 3; ++c) moved[a][c] = static_cast<T>(step[a][c] - step[1][c]);
+    longest = max(longest, norm(moved[a]));
+  }
+  // Three for two leaves room for round-off.
+  if (after.at.distance > after.activation + T(3) * longest) return 0;
+  return double(Pair::change(kind, parameters, after, moved));
+}
+
+/// E(x + alpha p) - E(x)
+template <class Pair, class Precision, class S>
+struct PairChange {
+  PairTable<Precision, S> pairs;
+  VectorField<typename Precision::position, S> x;
+  VectorField<typename Precision::real, S> p;
+  double alpha;
+  [[gnu::noinline]] KOKKOS_FUNCTION double change(int k) const {
+    Vec3<double> y[4], step[4];
+    pairs.read(k, x, y);
+    pairs.read_step(k, p, alpha, step);
+    for (int a = 0; a < 4; ++a) y[a] = y[a] + step[a];
+    auto const kind = pairs.kind(k);
+    auto const parameters = pairs.parameters(k);
+    return change_of_pair<Pair>(kind, parameters, Pair::evaluate(kind, parameters, y), step);
+  }
+  KOKKOS_FUNCTION void operator()(int k, Sums<double, 1>& sum) const { sum[0] += change(k); }
+};
+
+/// Slots: what each pair adds to the gradient and to `numbers` of the curvature of its vertices.
+template <class Precision, class S>
+struct ContactSlots {
+  using Real = typename Precision::real;
+  Kokkos::View<std::uint8_t*, typename S::memory> acts;  ///< per pair
+  VectorField<Real, S> vector;
+  BlockField<Real, S> curvature;
+};
+
+template <class Pair, class Precision, class S, int numbers>
+struct EvaluatePair {
+  using Real = typename Precision::real;
+  PairTable<Precision, S> pairs;
+  VectorField<typename Precision::position, S> x;
+  VectorField<Real, S> p;  ///< of the step that led to x
+  double alpha;
+  ContactSlots<Precision, S> to;
+
+  [[gnu::noinline]] KOKKOS_FUNCTION double evaluate(int k, bool after_step) const {
+    Vec3<double> y[4];
+    pairs.read(k, x, y);
+    auto const kind = pairs.kind(k);
+    auto const parameters = pairs.parameters(k);
+    auto const s = Pair::evaluate(kind, parameters, y);
+    bool const acts = s.at.distance < s.activation;
+    to.acts(k) = acts ? 1 : 0;
+    for (int a = 0; acts && a < 4; ++a) {
+      Vec3<Real> const g = Pair::gradient(s, a);
+      for (int c = 0; c < 3; ++c) to.vector(4 * k + a, c) = g[c];
+      if constexpr (numbers == 3) {
+        Vec3<Real> const h = Pair::diagonal(s, a);
+        for (int c = 0; c < 3; ++c) to.curvature(4 * k + a, c) = h[c];
+      }
+      if constexpr (numbers == 6) {
+        Sym3<Real> const h = Pair::block(s, a);
+        for (int c = 0; c < 6; ++c) to.curvature(4 * k + a, c) = h.s[c];
+      }
+    }
+    if (!after_step) return 0;
+    Vec3<double> step[4];
+    pairs.read_step(k, p, alpha, step);
+    return change_of_pair<Pair>(kind, parameters, s, step);
+  }
+};
+
+template <class Pair, class Precision, class S, int numbers>
+struct PairGradient : EvaluatePair<Pair, Precision, S, numbers> {
+  KOKKOS_FUNCTION void operator()(int k) const { this->evaluate(k, false); }
+};
+/// And E(x) - E(x - alpha p).
+template <class Pair, class Precision, class S, int numbers>
+struct PairGradientAfter : EvaluatePair<Pair, Precision, S, numbers> {
+  KOKKOS_FUNCTION void operator()(int k, Sums<double, 1>& sum) const {
+    sum[0] += this->evaluate(k, true);
+  }
+};
+
+template <class Pair, class Precision, class S>
+struct PairForm {
+  using Real = typename Precision::real;
+  PairTable<Precision, S> pairs;
+  VectorField<typename Precision::position, S> x;
+  VectorField<Real, S> p;
+  [[gnu::noinline]] KOKKOS_FUNCTION double form(int k) const {
+    Vec3<double> y[4], step[4];
+    Vec3<Real> q[4];
+    pairs.read(k, x, y);
+    auto const s = Pair::evaluate(pairs.kind(k), pairs.parameters(k), y);
+    if (!(s.at.distance < s.activation)) return 0;
+    pairs.read_step(k, p, 1, step);
+    for (int a = 0; a < 4; ++a)
+      for (int c = 0; c < 3; ++c) q[a][c] = static_cast<Real>(step[a][c]);
+    return double(Pair::quadratic(s, q));
+  }
+  KOKKOS_FUNCTION void operator()(int k, Sums<double, 1>& sum) const { sum[0] += form(k); }
+};
+
+/// Block (a, b) of the projected Hessian of a pair; of the whole of it where that must be
+/// projected.
+template <class Pair, class T>
+class PairHessian {
+public:
+  KOKKOS_INLINE_FUNCTION explicit PairHessian(PairState<T> const& s) : s_(s) {
+    if constexpr (!Pair::Curvature::positive) h_ = Pair::hessian(s);
+  }
+  KOKKOS_INLINE_FUNCTION Mat3<T> block(int a, int b) const {
+    if constexpr (Pair::Curvature::positive) {
+      return Pair::Curvature::block(s_, a, b);
+    } else {
+      Mat3<T> r;
+      for (int j = 0; j < 3; ++j)
+        for (int i = 0; i < 3; ++i) r(i, j) = h_(3 * a + i, 3 * b + j);
+      return r;
+    }
+  }
+
+private:
+  struct Nothing {};
+  PairState<T> const& s_;
+  std::conditional_t<Pair::Curvature::positive, Nothing, SquareMatrix<T, 12>> h_;
+};
+
+/// Slots of H p. What is fixed does not move.
+template <class Pair, class Precision, class S>
+struct PairProduct {
+  using Real = typename Precision::real;
+  PairTable<Precision, S> pairs;
+  VectorField<typename Precision::position, S> x;
+  VectorField<Real, S> p;
+  FixedMask<S> fixed;
+  ContactSlots<Precision, S> to;
+  [[gnu::noinline]] KOKKOS_FUNCTION void multiply(int k) const {
+    Vec3<double> y[4];
+    pairs.read(k, x, y);
+    auto const s = Pair::evaluate(pairs.kind(k), pairs.parameters(k), y);
+    bool const acts = s.at.distance < s.activation;
+    to.acts(k) = acts ? 1 : 0;
+    if (!acts) return;
+    PairHessian<Pair, Real> const h(s);
+    for (int a = 0; a < 4; ++a) {
+      Vec3<Real> sum{};
+      for (int b = 0; b < 4; ++b) {
+        int const v = pairs.vertex(k, b);
+        if (fixed(v)) continue;
+        sum = sum + h.block(a, b) * Vec3<Real>{p(v, 0), p(v, 1), p(v, 2)};
+      }
+      for (int c = 0; c < 3; ++c) to.vector(4 * k + a, c) = sum[c];
+    }
+  }
+  KOKKOS_FUNCTION void operator()(int k) const { multiply(k); }
+};
+
+/// Adds the slots of surface vertex i, and `numbers` of curvature, times `scale`.
+template <class Precision, class S, class CurvatureField, int numbers>
+struct GatherSlots {
+  using Real = typename Precision::real;
+  typename SurfaceViews<S>::Indices vertex;
+  SlotsOfVertices<S> of;
+  ContactSlots<Precision, S> from;
+  FixedMask<S> fixed;
+  double scale;
+  VectorField<Real, S> g;
+  CurvatureField curvature;
+
+  KOKKOS_FUNCTION void operator()(int i) const { add(vertex(i)); }
+  [[gnu::noinline]] KOKKOS_FUNCTION void add(int v) const {
+    if (fixed(v)) return;
+    Vec3<double> sum{};
+    double h[6] = {};
+    for (int j = of.begin(v); j < of.begin(v + 1); ++j) {
+      int const slot = of.slot(j);
+      if (!from.acts(slot / 4)) continue;
+      for (int c = 0; c < 3; ++c) sum[c] += double(from.vector(slot, c));
+      for (int c = 0; c < numbers; ++c) h[c] += double(from.curvature(slot, c));
+    }
+    for (int c = 0; c < 3; ++c) g(v, c) += static_cast<Real>(scale * sum[c]);
+    if constexpr (numbers > 0) {
+      for (int c = 0; c < numbers; ++c) curvature(v, c) += static_cast<Real>(scale * h[c]);
+    }
+  }
+};
+
+/// Adds the blocks of surface vertex i's row. Each row is written by one thread, so a pair is
+/// evaluated once per corner.
+template <class Pair, class Precision, class S>
+struct AssembleRows {
+  using Real = typename Precision::real;
+  typename SurfaceViews<S>::Indices vertex;
+  SlotsOfVertices<S> of;
+  PairTable<Precision, S> pairs;
+  VectorField<typename Precision::position, S> x;
+  FixedMask<S> fixed;
+  BlockCsr<S, double> matrix;
+  double scale;
+
+  KOKKOS_FUNCTION void operator()(int i) const {
+    int const v = vertex(i);
+    if (fixed(v)) return;
+    for (int j = of.begin(v); j < of.begin(v + 1); ++j) add(v, of.slot(j));
+  }
+  [[gnu::noinline]] KOKKOS_FUNCTION void add(int v, int slot) const {
+    int const k = slot / 4, a = slot % 4;
+    Vec3<double> y[4];
+    pairs.read(k, x, y);
+    auto const s = Pair::evaluate(pairs.kind(k), pairs.parameters(k), y);
+    if (!(s.at.distance < s.activation)) return;
+    PairHessian<Pair, Real> const h(s);
+    for (int b = 0; b < 4; ++b) {
+      int const w = pairs.vertex(k, b);
+      if (fixed(w)) continue;
+      Mat3<Real> const block = h.block(a, b);
+      Mat3<double> scaled;
+      for (int m = 0; m < 9; ++m) scaled.a[m] = scale * double(block.a[m]);
+      matrix.add(v, w, scaled);
+    }
+  }
+};
+
+template <class Precision, class S>
+struct PairDistance {
+  using Real = typename Precision::real;
+  PairTable<Precision, S> pairs;
+  VectorField<typename Precision::position, S> x;
+  [[gnu::noinline]] KOKKOS_FUNCTION Real distance(int k) const {
+    Vec3<double> y[4];
+    Vec3<Real> local[4];
+    pairs.read(k, x, y);
+    for (int a = 0; a < 4; ++a)
+      for (int c = 0; c < 3; ++c) local[a][c] = static_cast<Real>(y[a][c] - y[1][c]);
+    return closest_points(pairs.kind(k), local).distance;
+  }
+  KOKKOS_FUNCTION bool acts(int k) const { return distance(k) < pairs.activation(k); }
+};
+
+template <class Precision, class S>
+struct CountContacts : PairDistance<Precision, S> {
+  KOKKOS_FUNCTION void operator()(int k, Sums<double, 1>& count) const {
+    if (this->acts(k)) count[0] += 1;
+  }
+};
+
+/// Lowers to the share that is left of the activation distance.
+template <class Precision, class S>
+struct LeastGap : PairDistance<Precision, S> {
+  KOKKOS_FUNCTION void operator()(int k, double& least) const {
+    double const a = double(this->pairs.activation(k));
+    if (a > 0) least = Kokkos::min(least, double(this->distance(k)) / a);
+  }
+};
+
+/// Lowers to the first pair that acts and has a block that `matrix` does not store.
+template <class Precision, class S>
+struct FindMissingBlock : PairDistance<Precision, S> {
+  FixedMask<S> fixed;
+  BlockCsr<S, double> matrix;
+  KOKKOS_FUNCTION void operator()(int k, int& first) const {
+    if (k < first && !stored(k) && this->acts(k)) first = k;
+  }
+  KOKKOS_FUNCTION bool stored(int k) const {
+    for (int a = 0; a < 4; ++a)
+      for (int b = 0; b < 4; ++b) {
+        int const i = this->pairs.vertex(k, a), j = this->pairs.vertex(k, b);
+        if (!fixed(i) && !fixed(j) && matrix.find(i, j) < 0) return false;
+      }
+    return true;
+  }
+};
+
+/// The longest motion of a vertex of the surface against the first.
+template <class Precision, class S>
+struct LargestMotion {
+  typename SurfaceViews<S>::Indices vertex;
+  VectorField<typename Precision::real, S> p;
+  KOKKOS_FUNCTION void operator()(int i, double& largest) const {
+    int const v = vertex(i), o = vertex(0);
+    Vec3<double> d;
+    for (int c = 0; c < 3; ++c) d[c] = double(p(v, c)) - double(p(o, c));
+    double length = norm(d);
+    // A maximum passes over what is not a number.
+    if (!(length >= 0)) length = Kokkos::Experimental::infinity_v<double>;
+    largest = Kokkos::max(largest, length);
+  }
+};
+
+/// Remembers the vertices of pair k.
+template <class S>
+struct KeepPair {
+  PairIds<S> ids;
+  int k;
+  Kokkos::View<int[4], typename S::memory> to;
+  KOKKOS_FUNCTION void operator()(int) const {
+    for (int a = 0; a < 4; ++a) to(a) = ids(k, a);
+  }
+};
+
+}  // namespace taut::kernels
