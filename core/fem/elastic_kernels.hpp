@@ -44,9 +44,9 @@ struct GradientSweep : PatchSweep<S, typename Precision::real> {
                                            Real* slots) const {
     Mat3<T> const P = Material::stress(state);
     Vec3<T> rest{T(0), T(0), T(0)};
-#if defined(__CUDACC__)
+#if defined(__CUDA_ARCH__)
 #pragma unroll
-#else
+#elif !defined(__CUDACC__)
 #pragma GCC unroll 4
 #endif
     for (int a = 0; a < 4; ++a) {
