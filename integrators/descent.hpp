@@ -177,7 +177,7 @@ private:
     bool const curvature_due = clock_.due_after_step();
     Line<E> line(e_, x_, fields_,
                  curvature_due ? preconditioner_.curvature() : LocalMatrices<P, S>(), heading.slope,
-                 largest_decrement_);
+                 largest_decrement_, rule_.negligible());
     if (!scale_.has_inertia) line.curvature();
     step_ = search_(line, heading.first_length);
     report_.backtracks += step_.backtracks;

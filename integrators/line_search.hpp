@@ -35,15 +35,17 @@ public:
   using Vectors = VectorField<typename P::real, S>;
 
   /// Gradients at trial points, and where wanted the curvature, are written into
-  /// fields.gradient_before and `curvature`; `energy_unit` is the size of energy changes so far.
+  /// fields.gradient_before and `curvature`; `energy_unit` is the size of energy changes so far,
+  /// `negligible` what a stopping rule takes for nothing.
   Line(E& objective, Positions const& x, DescentFields<P, S> const& fields,
-       LocalMatrices<P, S> const& curvature, double slope, double energy_unit)
+       LocalMatrices<P, S> const& curvature, double slope, double energy_unit, double negligible)
       : objective_(objective),
         x_(x),
         fields_(fields),
         curvature_(curvature),
         slope_(slope),
-        energy_unit_(energy_unit) {}
+        energy_unit_(energy_unit),
+        negligible_(negligible) {}
 
   double slope() const { return slope_; }
   /// p'Hp at the beginning; asked for once, before the first move. NaN until then.
@@ -106,10 +108,13 @@ public:
     kernels::Dot<P, S> const dot{fields_.gradient_before, fields_.direction};
     return double(fields_.reducer.template sum<1>("slope", objective_.size(), dot)[0]);
   }
-  /// Energy differences below this are round-off.
+  /// Energy differences below this are round-off, or where a step promises nothing that matters,
+  /// as little as that.
   double round_off() {
-    double const unit = std::max(energy_unit_, std::abs(slope_ * length_));
-    return 16 * double(Kokkos::Experimental::epsilon_v<typename P::real>) * unit;
+    double const promised = std::abs(slope_ * length_);
+    double const unit = std::max(energy_unit_, promised);
+    double const noise = 16 * double(Kokkos::Experimental::epsilon_v<typename P::real>) * unit;
+    return promised < negligible_ ? std::max(noise, negligible_) : noise;
   }
 
 private:
@@ -117,7 +122,7 @@ private:
   Positions const& x_;
   DescentFields<P, S> const& fields_;
   LocalMatrices<P, S> const curvature_;
-  double slope_, energy_unit_;
+  double slope_, energy_unit_, negligible_;
   double form_ = std::numeric_limits<double>::quiet_NaN();
   double length_ = 0;
   bool moved_ = false;

@@ -61,6 +61,9 @@ public:
   double error_estimate() const {
     return std::visit([](auto const& rule) { return rule.error_estimate(); }, rule_);
   }
+  double negligible() const {
+    return std::visit([](auto const& rule) { return rule.negligible(); }, rule_);
+  }
 
 private:
   std::variant<DecrementWindow, EnergyDrop, GradientNorm> rule_;

@@ -34,7 +34,7 @@ struct Setting {
         slope += fields.gradient(i, c) * fields.direction(i, c);
       }
   }
-  Line<Chain> line() { return {chain, x, fields, {}, slope, 0}; }
+  Line<Chain> line() { return {chain, x, fields, {}, slope, 0, 0}; }
 
   /// Whether x is where a step of this length leads.
   bool arrived(double alpha) const {

@@ -52,6 +52,27 @@ TEST_CASE("the decrement window stops when the sum of its steps is small") {
         Stop::converged_by_decrement);
 }
 
+TEST_CASE("what a thousand steps would not bring to the tolerance need not fall") {
+  // 1/2 M (tol L)^2 / 1024 = 4.9e-6
+  DecrementWindow rule({.tolerance = 0.1, .window = 4});
+  Scale scale{.mass = 1, .length = 1};
+  rule.start(scale);
+  CHECK_THAT(rule.negligible(), WithinRel(5e-3 / 1024, 1e-14));
+  for (int k = 0; k < 3; ++k) CHECK(rule.check(step(1e-6)) == Stop::none);
+  CHECK(rule.check(step(1e-6)) == Stop::converged_by_decrement);
+  rule.forget();
+  for (int k = 0; k < 100; ++k) CHECK(rule.check(step(2e-6)) == Stop::none);
+  // Not below what round-off allows.
+  rule.start(scale);
+  for (int k = 0; k < 3; ++k) rule.check(step(1e-6));
+  CHECK(rule.check({.attainable = 1e-6, .floor = 1}) == Stop::stalled);
+  // Without inertia the curvature that remains may be far smaller.
+  scale.has_inertia = false;
+  rule.start(scale);
+  CHECK(rule.negligible() == 0);
+  for (int k = 0; k < 100; ++k) CHECK(rule.check(step(1e-6)) == Stop::none);
+}
+
 TEST_CASE("the window grows where decrements do not fall, and shrinks where they fall fast") {
   DecrementWindow rule({.tolerance = 0.1, .window = 8});
   rule.start({.mass = 1, .length = 1});
