@@ -29,11 +29,19 @@ struct PairTable {
   KOKKOS_FUNCTION PairParameters<Real> parameters(int k) const {
     return {stiffness(k), activation(k), mollifier(k)};
   }
-  /// Where the vertices of pair k are at x + alpha p, and alpha p.
+  /// Where the vertices of pair k are at x, what the pair is there, and alpha p.
   KOKKOS_FUNCTION void read(int k, VectorField<typename Precision::position, S> const& x,
                             Vec3<double> (&y)[4]) const {
-    for (int a = 0; a < 4; ++a)
-      for (int c = 0; c < 3; ++c) y[a][c] = double(x(vertex(k, a), c));
+    int v[4];
+    read_pair(vertex, k, v);
+    gather(v, x, y);
+  }
+  template <class Pair>
+  KOKKOS_FUNCTION PairState<Real> evaluate(
+      int k, VectorField<typename Precision::position, S> const& x) const {
+    Vec3<double> y[4];
+    read(k, x, y);
+    return Pair::evaluate(kind(k), parameters(k), y);
   }
   KOKKOS_FUNCTION void read_step(int k, VectorField<Real, S> const& p, double alpha,
                                  Vec3<double> (&step)[4]) const {
@@ -83,9 +91,7 @@ struct PairValue {
   PairTable<Precision, S> pairs;
   VectorField<typename Precision::position, S> x;
   [[gnu::noinline]] KOKKOS_FUNCTION double value(int k) const {
-    Vec3<double> y[4];
-    pairs.read(k, x, y);
-    auto const s = Pair::evaluate(pairs.kind(k), pairs.parameters(k), y);
+    auto const s = pairs.template evaluate<Pair>(k, x);
     return s.at.distance < s.activation ? double(Pair::value(s)) : 0;
   }
   KOKKOS_FUNCTION void operator()(int k, Sums<double, 1>& sum) const { sum[0] += value(k); }
@@ -145,11 +151,7 @@ struct EvaluatePair {
   ContactSlots<Precision, S> to;
 
   [[gnu::noinline]] KOKKOS_FUNCTION double evaluate(int k, bool after_step) const {
-    Vec3<double> y[4];
-    pairs.read(k, x, y);
-    auto const kind = pairs.kind(k);
-    auto const parameters = pairs.parameters(k);
-    auto const s = Pair::evaluate(kind, parameters, y);
+    auto const s = pairs.template evaluate<Pair>(k, x);
     bool const acts = s.at.distance < s.activation;
     to.acts(k) = acts ? 1 : 0;
     for (int a = 0; acts && a < 4; ++a) {
@@ -167,7 +169,7 @@ struct EvaluatePair {
     if (!after_step) return 0;
     Vec3<double> step[4];
     pairs.read_step(k, p, alpha, step);
-    return change_of_pair<Pair>(kind, parameters, s, step);
+    return change_of_pair<Pair>(pairs.kind(k), pairs.parameters(k), s, step);
   }
 };
 
@@ -190,10 +192,9 @@ struct PairForm {
   VectorField<typename Precision::position, S> x;
   VectorField<Real, S> p;
   [[gnu::noinline]] KOKKOS_FUNCTION double form(int k) const {
-    Vec3<double> y[4], step[4];
+    Vec3<double> step[4];
     Vec3<Real> q[4];
-    pairs.read(k, x, y);
-    auto const s = Pair::evaluate(pairs.kind(k), pairs.parameters(k), y);
+    auto const s = pairs.template evaluate<Pair>(k, x);
     if (!(s.at.distance < s.activation)) return 0;
     pairs.read_step(k, p, 1, step);
     for (int a = 0; a < 4; ++a)
@@ -238,9 +239,7 @@ struct PairProduct {
   FixedMask<S> fixed;
   ContactSlots<Precision, S> to;
   [[gnu::noinline]] KOKKOS_FUNCTION void multiply(int k) const {
-    Vec3<double> y[4];
-    pairs.read(k, x, y);
-    auto const s = Pair::evaluate(pairs.kind(k), pairs.parameters(k), y);
+    auto const s = pairs.template evaluate<Pair>(k, x);
     bool const acts = s.at.distance < s.activation;
     to.acts(k) = acts ? 1 : 0;
     if (!acts) return;
@@ -308,9 +307,7 @@ struct AssembleRows {
   }
   [[gnu::noinline]] KOKKOS_FUNCTION void add(int v, int slot) const {
     int const k = slot / 4, a = slot % 4;
-    Vec3<double> y[4];
-    pairs.read(k, x, y);
-    auto const s = Pair::evaluate(pairs.kind(k), pairs.parameters(k), y);
+    auto const s = pairs.template evaluate<Pair>(k, x);
     if (!(s.at.distance < s.activation)) return;
     PairHessian<Pair, Real> const h(s);
     for (int b = 0; b < 4; ++b) {
