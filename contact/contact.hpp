@@ -38,8 +38,8 @@ struct LimitingPair {
 };
 
 template <class Pair_ = PairEnergy<>, class Search_ = SpatialHash<DefaultSpace>,
-          class Bound_ = AdditiveCcd, class Stiffness_ = GivenStiffness, class Precision_ = Mixed,
-          class Space_ = typename Search_::Space>
+          class Bound_ = AdditiveCcd, class Stiffness_ = ElasticInclusiveStiffness,
+          class Precision_ = Mixed, class Space_ = typename Search_::Space>
 class Contact {
 public:
   using Pair = Pair_;
@@ -154,15 +154,27 @@ public:
   /// The pair that the last max_step was cut by; none if it was not.
   std::optional<LimitingPair> limiting_pair() const { return state_->limiting_pair(); }
 
-  /// For rules that need it: one entry per vertex, N/m; the values are taken over now. To be set
-  /// between steps, for the energy is another function afterwards. Throws Error for another length.
-  void set_vertex_stiffness(Array<Real, Space> const& stiffness) {
-    state_->set_vertex_stiffness(stiffness);
+  std::optional<Obstruction> obstruction() const {
+    auto const pair = limiting_pair();
+    if (!pair) return {};
+    bool const points = pair->kind == PairKind::point_triangle;
+    return Obstruction{points ? "a point and a triangle that touch" : "two edges that touch",
+                       {pair->vertices.begin(), pair->vertices.end()}};
   }
-  /// To be called where other unknowns have become fixed or free.
-  void fixed_changed() { state_->forget(); }
+
+  /// Takes over the stiffness per vertex, for rules that need it; forgets all candidates.
+  void begin_step(StepStart<Precision, Space> const& start) const { state_->begin_step(start); }
+  /// Grows with each search; x brings the candidates up to date.
+  std::int64_t pattern_version(Positions const& x) const {
+    state_->complete({x, {}, 0, state_->fixed});
+    return state_->near.counters().searches;
+  }
 
   double dhat() const { return state_->activation.dhat; }
+  /// 0.3 of the mean edge of the surface at rest, m.
+  static double default_dhat(Surface const& surface, std::vector<Point> const& rest) {
+    return 0.3 * edge_lengths(surface, rest).mean;
+  }
   /// Searches, and the calls that did without: for energies, and for bounds.
   CacheCounters const& energy_counters() const { return state_->near.counters(); }
   CacheCounters const& bound_counters() const { return state_->swept.counters(); }
@@ -198,7 +210,8 @@ private:
 
     State(Unknowns<Precision, Space> const& unknowns, Surface const& host,
           std::vector<Point> const& rest, Params const& params)
-        : fixed(unknowns.fixed), bound(params.bound), clearance(params.clearance) {
+        : fixed(unknowns.fixed), bound(params.bound),
+          clearance(params.clearance) {
       if (rest.size() != host.object.size() || rest.size() != std::size_t(unknowns.size())) {
         throw Error(
             "contact: {} positions at rest, a surface over {} vertices and {} unknowns: give as "
@@ -211,7 +224,7 @@ private:
       }
       surface = copy_surface<Space>(host);
       portion = edges.mean;
-      activation = {params.dhat.value_or(0.3 * edges.mean), params.cap,
+      activation = {params.dhat.value_or(default_dhat(host, rest)), params.cap,
                     copy_points<Space>("contact_rest", rest), surface.object};
       near = Cache(surface, edges.mean, activation, params.search);
       swept = Cache(surface, edges.mean, activation, params.search);
@@ -226,12 +239,12 @@ private:
       table.take(near.candidates(), near.counters().searches);
       return table.pairs().count > 0;
     }
-    void forget() {
+    void begin_step(StepStart<Precision, Space> const& start) {
+      if constexpr (Stiffness_::per_vertex) table.set_vertex_stiffness(start.stiffness);
+      // What is fixed may have changed; and candidates that do not depend on steps past make a
+      // restarted run go on bitwise.
       near.forget();
       swept.forget();
-    }
-    void set_vertex_stiffness(Array<Real, Space> const& stiffness) {
-      table.set_vertex_stiffness(stiffness);
     }
 
     double max_step(Positions const& x, Vectors const& p, double at_most) {

@@ -87,8 +87,8 @@ public:
     if (taken_ == search) return;
     if (Rule::per_vertex && fields_.stiffness.extent(0) == 0) {
       throw Error(
-          "contact: the stiffness rule '{}' needs a stiffness per vertex: call "
-          "set_vertex_stiffness before each step",
+          "contact: the stiffness rule '{}' needs to be told when a step begins: call begin_step "
+          "first, of the potential or of the term",
           Rule::name);
     }
     taken_ = 0;  // should it throw

@@ -5,8 +5,8 @@
 //                              depends on the load over P alone, not on the time step, and on the
 //                              mesh only as far as that carries the load through other pairs.
 //   ElasticInclusiveStiffness  K = mean over the vertices of m / h^2 + the diagonal of the elastic
-//                              Hessian: what resists the pair in this step. One setting serves all
-//                              moduli, but the gap depends on the step.
+//                              Hessian: what resists the pair in this step (StepStart). One setting
+//                              serves all moduli, but the gap depends on the step. The default.
 //
 // A is a quarter of the smaller of the areas that the two sides stand for, for two surfaces that
 // lie on each other meet as points of the first, as points of the second, and where edges cross,
@@ -26,7 +26,7 @@ namespace taut {
 template <class Precision, class S>
 struct StiffnessFields {
   Array<typename Precision::real, S> area;       ///< a third of the triangles around, at rest, m^2
-  Array<typename Precision::real, S> stiffness;  ///< as it was set, N/m
+  Array<typename Precision::real, S> stiffness;  ///< StepStart::stiffness, N/m
   FixedMask<S> fixed;
   double dhat;  ///< m
 };
@@ -79,54 +79,6 @@ struct ElasticInclusiveStiffness {
     }
     return free > 0 ? factor * sum / free : 0;
   }
-};
-
-namespace kernels {
-template <class Precision, class S>
-struct VertexStiffness {
-  using Real = typename Precision::real;
-  Array<Real, S> mass;
-  VectorField<Real, S> diagonal;
-  double inverse_square_step;
-  Array<Real, S> to;
-  KOKKOS_FUNCTION void operator()(int i) const {
-    double const elastic = double(diagonal(i, 0)) + double(diagonal(i, 1)) + double(diagonal(i, 2));
-    to(i) = static_cast<Real>(double(mass(i)) * inverse_square_step + elastic / 3);
-  }
-};
-}  // namespace kernels
-
-/// The field of ElasticInclusiveStiffness, in memory of its own. Before each step:
-///
-///   contact.set_vertex_stiffness(inclusive.at(elastic, unknowns, state.x, h));
-template <class Precision = Mixed, class Space = DefaultSpace>
-class InclusiveStiffness {
-public:
-  using Positions = VectorField<typename Precision::position, Space>;
-  using Field = Array<typename Precision::real, Space>;
-
-  /// m / h^2 + the mean of the diagonal of the Hessian of `elastic` (a SweptTerm) at x, N/m.
-  template <class Elastic>
-  Field const& at(Elastic const& elastic, Unknowns<Precision, Space> const& unknowns,
-                  Positions const& x, double h) {
-    if (field_.extent_int(0) != unknowns.size()) {
-      field_ = Field("vertex_stiffness", unknowns.size());
-      gradient_ = Vectors("vertex_stiffness_gradient", unknowns.size());
-      diagonal_ = Vectors("vertex_stiffness_diagonal", unknowns.size());
-    }
-    Kokkos::deep_copy(Space::instance(), gradient_, 0);
-    Kokkos::deep_copy(Space::instance(), diagonal_, 0);
-    elastic.add_gradient(x, 1.0, unknowns.fixed, gradient_, diagonal_);
-    for_each<Space>(
-        "vertex_stiffness", unknowns.size(),
-        kernels::VertexStiffness<Precision, Space>{unknowns.mass, diagonal_, 1 / (h * h), field_});
-    return field_;
-  }
-
-private:
-  using Vectors = VectorField<typename Precision::real, Space>;
-  Field field_;
-  Vectors gradient_, diagonal_;
 };
 
 }  // namespace taut

@@ -19,7 +19,7 @@ public:
 
   template <class E>
   void start(E& e) {
-    matrix_ = e.pattern();
+    matrix_.forget();
     host_ = typename Vectors::HostMirror("direct_host", e.size());
     numbers_.resize(3 * std::size_t(e.size()));
   }
@@ -28,8 +28,7 @@ public:
   template <class E, class M>
   LinearReport solve(E& e, VectorField<typename P::position, S> const& x, Vectors const& b,
                      M const&, double, Vectors const& p) {
-    e.assemble(x, matrix_);
-    if (solver_.factorize(matrix_) != Definiteness::positive) return {};
+    if (solver_.factorize(matrix_.at(e, x)) != Definiteness::positive) return {};
     int const n = static_cast<int>(b.extent(0));
     Kokkos::deep_copy(host_, b);
     for (int i = 0; i < n; ++i)
@@ -42,7 +41,7 @@ public:
   }
 
 private:
-  BlockCsr<S, double> matrix_;
+  HessianMatrix<P, S> matrix_;
   typename Vectors::HostMirror host_;
   std::vector<double> numbers_;
   DirectSolver solver_;

@@ -170,27 +170,48 @@ private:
   Reducer<S> reducer_;
 };
 
+/// H(x) in a matrix whose pattern is made anew where it has changed.
+template <class P, class S>
+class HessianMatrix {
+public:
+  /// Another objective, perhaps.
+  void forget() { version_ = -1; }
+  template <class E>
+  BlockCsr<S, double> const& at(E& e, VectorField<typename P::position, S> const& x) {
+    std::int64_t const version = e.pattern_version(x);
+    if (version != version_) matrix_ = e.pattern(x);
+    version_ = version;
+    e.assemble(x, matrix_);
+    return matrix_;
+  }
+  BlockCsr<S, double> const& operator()() const { return matrix_; }
+
+private:
+  BlockCsr<S, double> matrix_;
+  std::int64_t version_ = -1;
+};
+
 /// H(x) as a matrix: pays where more than a few products are taken at one x.
 template <class P, class S>
 class AssembledHessian {
 public:
   template <class E>
-  void start(E& e) {
-    matrix_ = e.pattern();
+  void start(E&) {
+    matrix_.forget();
   }
   template <class E>
   void update(E& e, VectorField<typename P::position, S> const& x) {
-    e.assemble(x, matrix_);
+    matrix_.at(e, x);
   }
   template <class E>
   void product(E&, VectorField<typename P::position, S> const&,
                VectorField<typename P::real, S> const& d,
                VectorField<typename P::real, S> const& hd) const {
-    taut::product(matrix_, d, hd);
+    taut::product(matrix_(), d, hd);
   }
 
 private:
-  BlockCsr<S, double> matrix_;
+  HessianMatrix<P, S> matrix_;
 };
 
 /// H(x) as a sweep over the elements per product: no memory.

@@ -39,7 +39,7 @@ public:
   /// Allocates, for contacts may have changed the pattern of H.
   template <class E>
   void update(E& e, VectorField<typename P::position, S> const& x) {
-    auto hessian = e.pattern();
+    auto hessian = e.pattern(x);
     e.assemble(x, hessian);
     update(hessian, e.scale().has_inertia);
   }

@@ -190,9 +190,10 @@ private:
       x_ = Positions("step_x", n);
       direction_ = VectorField<typename Precision::real, Space>("step_direction", n);
     }
-    potential.begin_step(r.scale * (R::inertia ? h * h : 1.0), h * std::sqrt(r.scale), R::inertia);
     auto& inertia = potential.template term<Inertia<Precision, Space>>();
     inertia.switch_on(R::inertia);
+    potential.begin_step(state.x, r.scale * (R::inertia ? h * h : 1.0), h * std::sqrt(r.scale),
+                         R::inertia);
     for_each<Space>("inertial_target", n,
                     kernels::InertialTarget<Precision, Space>{state, inertia.target(), x_, r.a0,
                                                               r.a1, h * r.b0, h * r.b1});
@@ -216,11 +217,14 @@ private:
         maximum<Space>("start_direction", state.size(), 0.0,
                        kernels::StartDirection<Precision, Space>{unknowns.fixed, state.x, x_,
                                                                  unknowns.prescribed, direction_});
+    bool const prescribed = moved > 0 || potential.motion_left(state.x) > 0;
     double bound = potential.max_step(state.x, direction_, 2.0);
-    if (moved > 0) bound = potential.max_prescribed_step(state.x, direction_, bound);
+    if (prescribed) bound = potential.max_prescribed_step(state.x, direction_, bound);
+    double const fraction = std::min(1.0, 0.5 * bound);
     for_each<Space>("start", state.size(),
                     kernels::Start<Precision, Space>{unknowns.fixed, state.x, unknowns.prescribed,
-                                                     x_, std::min(1.0, 0.5 * bound)});
+                                                     x_, fraction});
+    if (prescribed) potential.advance(fraction);
   }
 
   Minimiser minimiser_;

@@ -14,7 +14,7 @@ class ImplicitMidpoint {
 public:
   template <class Potential>
   MinimiserReport step(Potential& potential, State<>& state, double h) {
-    potential.begin_step(h * h / 4, h / 2, true);
+    potential.begin_step(state.x, h * h / 4, h / 2, true);
     auto const target = potential.template term<Inertia<>>().target();
     State<>::Positions const y("midpoint", state.size());
     axpy(target, 1, state.x, h / 2, state.v);

@@ -107,8 +107,8 @@ private:
     constexpr int iterations = 6;
     double const h = 0.01;
     ProgramPotential<P> potential(unknowns, Inertia<P>(unknowns),
-                                  BodyForce<P>(unknowns, {0, -9.81, 0}), terms);
-    potential.begin_step(h * h, h, true);
+                                  BodyForce<P>(unknowns, {0, -9.81, 0}), terms, {});
+    potential.begin_step(start, h * h, h, true);
     Kokkos::deep_copy(potential.template term<Inertia<P>>().target(), start);
     typename Unknowns<P>::Positions const x("x", start.extent(0));
     AnyMinimiser<P> minimiser(pncg(iterations));

@@ -22,8 +22,8 @@ std::vector<std::filesystem::path> scene_folders();
 std::filesystem::path find_scene(std::string const& name);
 
 /// When a run looks for intersections. A scene that starts with some is refused if any later ones
-/// are looked for, and warned of if not.
-enum class CheckRun { off, every_step };
+/// are looked for, or if it has contact, and warned of if not.
+enum class CheckRun { off, every_step, every_iteration };
 
 struct RunOptions {
   SceneArguments scene;

@@ -77,10 +77,15 @@ std::string to_text(OptionValue const& value) {
 }
 
 /// "at least 1 and at most 100", or the words to choose from.
-std::string accepted(SolverKey const& key) {
+std::string accepted(OptionKey const& key) {
   if (!key.choices.empty()) return fmt::format("{}", fmt::join(key.choices, ", "));
   if (std::holds_alternative<bool>(key.fallback)) return "true, false";
   return key.range.describe();
+}
+
+void print_key(std::string_view table, OptionKey const& key) {
+  fmt::print("{}.{} = {}\n", table, key.name, to_text(key.fallback));
+  fmt::print("  {}\n  {}\n", accepted(key), key.help);
 }
 
 /// What ends a step.
@@ -99,16 +104,34 @@ std::string stop_of(SolverOptions const& solver, double edge, double h, bool qua
   return text;
 }
 
+void print_contact(Scene const& scene) {
+  if (!scene.contact) {
+    fmt::print("  (no contact: no [contact], so bodies pass through each other)\n");
+    return;
+  }
+  ContactOptions const& contact = *scene.contact;
+  double const dhat = contact.number("dhat");
+  fmt::print("  contact       keeps bodies apart: {} barrier below {}, {} curvature, {}\n",
+             contact.text("barrier"),
+             dhat > 0 ? fmt::format("{:.3g} m", dhat) : "0.3 of the mean edge of the surface",
+             contact.text("curvature"),
+             contact.flag("mollifier") ? "parallel edges mollified" : "parallel edges as they are");
+  fmt::print("                pairs by {}, stiffness {}\n", contact.text("search"),
+             contact.text("stiffness"));
+  fmt::print("                steps by {}: {}\n", contact.text("bound"),
+             contact.text("bound") == "half_dhat" ? "NO guarantee, bodies may cross"
+                                                  : "certified, nothing crosses");
+}
+
 }  // namespace
 
 int methods_command() {
   fmt::print("solver.method: what minimises the energy of a step\n");
   for (MethodTitle const& m : method_titles()) fmt::print("  {:<11} {}\n", m.name, m.description);
-  for (SolverKey const& key : solver_keys()) {
-    if (key.name == "method") continue;
-    fmt::print("solver.{} = {}\n", key.name, to_text(key.fallback));
-    fmt::print("  {}\n  {}\n", accepted(key), key.help);
+  for (OptionKey const& key : solver_keys()) {
+    if (key.name != "method") print_key("solver", key);
   }
+  for (OptionKey const& key : contact_keys()) print_key("contact", key);
   fmt::print("material.model: what resists deformation\n");
   for (MaterialModel const& model : material_models()) {
     fmt::print("  {:<24} {}\n  {:<24} {}\n", model.name, model.description, "",
@@ -167,7 +190,7 @@ int plan_command(SceneArguments const& arguments) {
     fmt::print("  pins          prescribe {} vertices, which leave the unknowns while held\n",
                pinned);
   }
-  fmt::print("  (no contact: this version has elastic terms alone)\n");
+  print_contact(scene);
 
   fmt::print("minimiser\n");
   bool const quasi_static = scene.scheme == TimeScheme::quasi_static;

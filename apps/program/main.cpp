@@ -85,10 +85,11 @@ int main(int argc, char** argv) {
   run_app
       ->add_option("--check", run.check,
                    "off, or every-step: ends at the first step that leaves an intersection (off)")
-      ->transform(
-          CLI::CheckedTransformer(std::map<std::string, CheckRun>{
-                                      {"off", CheckRun::off}, {"every-step", CheckRun::every_step}})
-              .description("{off,every-step}"));
+      ->transform(CLI::CheckedTransformer(std::map<std::string, CheckRun>{
+                                              {"off", CheckRun::off},
+                                              {"every-step", CheckRun::every_step},
+                                              {"every-iteration", CheckRun::every_iteration}})
+                      .description("{off,every-step}"));
   run_app->footer("example: taut run stretch_twist --frames 100 --method newton --out /tmp/twist");
   run_app->callback([&] { command = [&] { return run_command(run); }; });
 

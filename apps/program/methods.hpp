@@ -16,7 +16,8 @@
 namespace taut {
 
 template <class P>
-using ProgramPotential = Potential<Inertia<P>, BodyForce<P>, ProgramTerms<P>>;
+using ProgramPotential =
+    Potential<Inertia<P>, BodyForce<P>, ProgramTerms<P>, AnySteppedTerms<P, DefaultSpace>>;
 
 struct MethodTitle {
   std::string_view name;         ///< value of solver.method

@@ -52,17 +52,20 @@ private:
 struct Totals {
   double seconds = 0;
   double steps = 0, converged = 0, iterations = 0, restarts = 0;
-  double worst_error = 0;     ///< m
-  double most_inverted = 0;   ///< elements in one step
-  double inverted_steps = 0;  ///< steps that end with inverted elements
+  double worst_error = 0;                  ///< m
+  double most_inverted = 0;                ///< elements in one step
+  double inverted_steps = 0;               ///< steps that end with inverted elements
+  double cut_steps = 0;                    ///< steps in which a bound cut an iteration
+  double contacts = 0, most_contacts = 0;  ///< at the ends of steps
+  double smallest_gap = 1;                 ///< of these, over the distance of contact
 
   std::vector<double> to_numbers() const {
-    return {seconds,  steps,       converged,     iterations,
-            restarts, worst_error, most_inverted, inverted_steps};
+    return {seconds,       steps,          converged, iterations, restarts,      worst_error,
+            most_inverted, inverted_steps, cut_steps, contacts,   most_contacts, smallest_gap};
   }
   static Totals from_numbers(std::vector<double> const& n) {
-    if (n.size() != 8) throw Error("the checkpoint's totals are not eight numbers");
-    return {n[0], n[1], n[2], n[3], n[4], n[5], n[6], n[7]};
+    if (n.size() != 12) throw Error("the checkpoint's totals are not twelve numbers");
+    return {n[0], n[1], n[2], n[3], n[4], n[5], n[6], n[7], n[8], n[9], n[10], n[11]};
   }
   double mean_iterations() const { return steps > 0 ? iterations / steps : 0; }
   double per_second() const { return seconds > 0 ? steps / seconds : 0; }
@@ -85,7 +88,7 @@ ObjectIntersections intersections_of(SceneGeometry const& geometry) {
   return {geometry.mesh.tets, geometry.object_of_tet, names, geometry.mesh.points.size()};
 }
 
-/// Nothing in a scene keeps bodies apart yet, so that one which starts intersecting may be meant
+/// What starts intersecting stays so where there is contact. Where there is none, it may be meant
 /// to: it is warned of, unless the run is to be free of intersections.
 void check_start(Scene const& scene, SceneGeometry& geometry, ObjectIntersections const& surface,
                  RunOptions const& options) {
@@ -94,23 +97,24 @@ void check_start(Scene const& scene, SceneGeometry& geometry, ObjectIntersection
   std::string const what =
       fmt::format("{}: the scene starts with {}; the first: {}", scene.file.string(),
                   surface.count(found), surface.text(found.front()));
-  if (options.check != CheckRun::off && !options.restart) {
-    throw Error(
-        "{}. Move the objects apart (object.NAME.translate), let one that meets itself start at "
-        "rest, or run without --check",
-        what);
+  if (scene.contact || (options.check != CheckRun::off && !options.restart)) {
+    throw Error("{}. Move the objects apart (object.NAME.translate){}", what,
+                scene.contact
+                    ? ", or let one that meets itself start at rest"
+                    : ", let one that meets itself start at rest, or run without --check");
   }
-  geometry.warnings.push_back(what + ". Nothing keeps bodies apart yet");
+  geometry.warnings.push_back(what + ". Nothing keeps bodies apart: [contact] would");
 }
 
 class Run {
 public:
-  /// `surface`: where steps are to be checked.
+  /// `surface`: where steps, or also iterations, are to be checked.
   Run(Scene const& scene, SceneGeometry const& geometry, RunOptions const& options,
       ObjectIntersections const* surface)
       : scene_(scene),
         geometry_(geometry),
         surface_(surface),
+        check_(options.check),
         folder_(options.out.empty() ? std::filesystem::path("results") / scene.name : options.out),
         text_(run_identity(options.scene.changes, scene, geometry)),
         simulation_(Simulation::create(scene, geometry)) {
@@ -215,7 +219,7 @@ private:
     Checkpoint before;
     if (surface_) simulation_->save(before);
     Timer const timer;
-    NewtonReport const r = simulation_->step();
+    NewtonReport const r = simulation_->step(watch_iterations());
     double const seconds = timer.seconds();
     if (surface_) refuse_intersections(before);
     totals_.seconds += seconds;
@@ -245,6 +249,15 @@ private:
         .set("refreshes", r.refreshes)
         .set("linear_iterations", r.linear_iterations)
         .set("seconds", seconds);
+    totals_.cut_steps += r.cuts > 0;
+    if (auto const contact = simulation_->contact()) {
+      totals_.contacts += contact->contacts;
+      totals_.most_contacts = std::max(totals_.most_contacts, double(contact->contacts));
+      totals_.smallest_gap = std::min(totals_.smallest_gap, contact->smallest_gap);
+      line.set("contacts", contact->contacts)
+          .set("candidates", contact->candidates)
+          .set("smallest_gap", contact->smallest_gap);
+    }
     if (scene_.output.check) {
       auto const inverted = inverted_tets(geometry_.mesh, simulation_->positions()).size();
       totals_.most_inverted = std::max(totals_.most_inverted, static_cast<double>(inverted));
@@ -267,9 +280,26 @@ private:
     simulation_->restore(before);
     if (!on_grid()) write_frame();
     throw Error(
-        "step {} at {:.6g} s leaves {}; the first: {}. The state before it is the last frame. "
-        "Nothing keeps bodies apart yet: --restart without --check goes on",
-        step, time, surface_->count(found), surface_->text(found.front()));
+        "step {} at {:.6g} s leaves {}; the first: {}. The state before it is the last frame. {}: "
+        "--restart without --check goes on",
+        step, time, surface_->count(found), surface_->text(found.front()), who_is_to_blame());
+  }
+  std::string who_is_to_blame() const {
+    if (!scene_.contact) return "Nothing keeps bodies apart, add a table [contact]";
+    if (scene_.contact->text("bound") == "half_dhat") {
+      return "contact.bound = \"half_dhat\" is no guarantee, use additive_ccd";
+    }
+    return "That must not happen with contact, report it together with the scene";
+  }
+  IterationObserver watch_iterations() const {
+    if (check_ != CheckRun::every_iteration) return {};
+    return [&](IterationView const& view) {
+      auto const found = surface_->find(view.positions());
+      if (found.empty()) return;
+      throw Error("step {} at {:.6g} s: iteration {} leaves {}; the first: {}. {}",
+                  simulation_->steps() + 1, simulation_->time(), view.index + 1,
+                  surface_->count(found), surface_->text(found.front()), who_is_to_blame());
+    };
   }
 
   void write_frame() {
@@ -292,6 +322,7 @@ private:
 
   void summarise(std::string const& how) {
     Record summary;
+    if (scene_.contact) set_contact(summary);
     summary.set("scene", scene_.name)
         .set("ended", how)
         .set("vertices", geometry_.mesh.points.size())
@@ -313,6 +344,13 @@ private:
     write_summary(folder_ / "summary.json", summary);
   }
 
+  void set_contact(Record& summary) const {
+    summary.set("mean_contacts", totals_.steps > 0 ? totals_.contacts / totals_.steps : 0)
+        .set("most_contacts", static_cast<std::int64_t>(totals_.most_contacts))
+        .set("smallest_gap", totals_.smallest_gap)
+        .set("steps_cut", static_cast<std::int64_t>(totals_.cut_steps));
+  }
+
   void say_where(int first, double seconds) const {
     int const steps = simulation_->steps() - first;
     if (steps == 0) {
@@ -325,6 +363,12 @@ private:
           scene_.name, interrupted ? "interrupted" : "done", first + 1, simulation_->steps(),
           seconds, seconds > 0 ? steps / seconds : 0, totals_.mean_iterations(), totals_.converged,
           totals_.steps, totals_.worst_error);
+    }
+    if (scene_.contact) {
+      fmt::print(
+          "contact  {:.1f} pairs on average, {:.0f} at most; smallest gap {:.2g} of dhat{}\n",
+          totals_.steps > 0 ? totals_.contacts / totals_.steps : 0, totals_.most_contacts,
+          totals_.smallest_gap, surface_ ? "; no intersections" : "");
     }
     if (totals_.inverted_steps > 0) {
       fmt::print(
@@ -342,6 +386,7 @@ private:
   Scene const& scene_;
   SceneGeometry const& geometry_;
   ObjectIntersections const* surface_;  ///< null: not asked for
+  CheckRun check_;
   std::filesystem::path folder_;
   std::string text_;
   std::unique_ptr<Simulation> simulation_;

@@ -123,6 +123,7 @@ struct Scene {
   std::vector<ScenePin> pins;
   std::vector<SceneForce> forces;
   SolverOptions solver;
+  std::optional<ContactOptions> contact;  ///< nothing keeps bodies apart without
   OutputOptions output;
   std::optional<Sweep> sweep;
   std::vector<std::string> warnings;

@@ -37,8 +37,8 @@ Sweep read_sweep(Section const& section) {
 
 Scene resolve(SceneValue const& document, std::filesystem::path const& file) {
   Section const root(document, "");
-  root.allow({"name", "description", "base", "gravity", "time", "object", "pin", "force", "solver",
-              "output", "small", "sweep"});
+  root.allow({"name", "description", "base", "gravity", "time", "object", "pin", "force", "contact",
+              "solver", "output", "small", "sweep"});
   Scene scene;
   scene.file = file;
   scene.name = root.text("name", file.stem().string());
@@ -52,6 +52,7 @@ Scene resolve(SceneValue const& document, std::filesystem::path const& file) {
   for (Section const& pin : root.list("pin")) scene.pins.push_back(read_pin(pin, scene));
   for (Section const& force : root.list("force")) scene.forces.push_back(read_force(force, scene));
   if (auto const solver = root.section("solver")) scene.solver = SolverOptions(*solver);
+  if (auto const contact = root.section("contact")) scene.contact = ContactOptions(*contact);
   if (auto const output = root.section("output")) scene.output = read_output(*output);
   if (auto const sweep = root.section("sweep")) scene.sweep = read_sweep(*sweep);
   return scene;

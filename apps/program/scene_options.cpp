@@ -1,10 +1,11 @@
 #include <taut/apps/program/scene_options.hpp>
+#include <taut/core/report/error.hpp>
 #include <taut/integrators/lbfgs.hpp>
 
 namespace taut {
 
-std::span<SolverKey const> solver_keys() {
-  static std::vector<SolverKey> const keys{
+std::span<OptionKey const> solver_keys() {
+  static std::vector<OptionKey> const keys{
       {"method",
        std::string("dk"),
        {},
@@ -82,26 +83,93 @@ std::span<SolverKey const> solver_keys() {
   return keys;
 }
 
-SolverOptions::SolverOptions() {
-  for (SolverKey const& key : solver_keys()) values_.emplace(key.name, key.fallback);
+std::span<OptionKey const> contact_keys() {
+  static std::vector<OptionKey> const keys{
+      {"dhat",
+       0.0,
+       {.min = 0, .max = 1e9, .unit = "m"},
+       {},
+       "distance at which contact begins to act; 0: 0.3 of the mean edge of the surface"},
+      {"cap",
+       0.5,
+       {.min = 0, .max = 1, .open_min = true, .open_max = true},
+       {},
+       "of its distance at rest: no pair of one body acts from further away"},
+      {"stiffness",
+       std::string("elastic_inclusive"),
+       {},
+       {"elastic_inclusive", "given"},
+       "of a pair: what its vertices resist with in this step; or `pressure` times area over dhat"},
+      {"pressure",
+       0.0,
+       {.min = 0, .max = 1e15, .unit = "Pa"},
+       {},
+       "of stiffness = \"given\": modulus of the layer of air, of thickness dhat, between bodies"},
+      {"stiffness_factor",
+       1.0,
+       {.min = 0, .max = 1e9, .open_min = true},
+       {},
+       "multiplies stiffness = \"elastic_inclusive\""},
+      {"barrier",
+       std::string("log"),
+       {},
+       {"log", "ipc", "log_squared", "cubic"},
+       "energy over distance; all but log in fp64 alone"},
+      {"curvature",
+       std::string("gauss_newton"),
+       {},
+       {"gauss_newton", "truncated", "exact"},
+       "of the barrier's energy: without the motion of the closest points, so that it is positive; "
+       "as in the PNCG paper; exact. All but gauss_newton in fp64 alone"},
+      {"mollifier",
+       true,
+       {},
+       {},
+       "takes nearly parallel edges out smoothly; off, as in the PNCG paper, in fp64 alone"},
+      {"search",
+       std::string("spatial_hash"),
+       {},
+       {"spatial_hash", "bvh", "brute_force"},
+       "how pairs are found; all find the same, and all but spatial_hash in fp64 alone"},
+      {"bound",
+       std::string("additive_ccd"),
+       {},
+       {"additive_ccd", "closing", "half_dhat"},
+       "how far a step may go: certified by continuous collision detection, or by the fastest "
+       "closing; half_dhat is the PNCG paper's, NO guarantee. All but additive_ccd in fp64 alone"},
+  };
+  return keys;
 }
 
-SolverOptions::SolverOptions(Section const& solver) : SolverOptions() {
+Options::Options(std::span<OptionKey const> keys) {
+  for (OptionKey const& key : keys) values_.emplace(key.name, key.fallback);
+}
+
+Options::Options(std::span<OptionKey const> keys, Section const& section) : Options(keys) {
   std::vector<std::string_view> names;
-  for (SolverKey const& key : solver_keys()) names.push_back(key.name);
-  solver.allow(names);
-  for (SolverKey const& key : solver_keys()) {
+  for (OptionKey const& key : keys) names.push_back(key.name);
+  section.allow(names);
+  for (OptionKey const& key : keys) {
     OptionValue& value = values_.find(key.name)->second;
     if (bool* flag = std::get_if<bool>(&value)) {
-      *flag = solver.flag(key.name, *flag);
+      *flag = section.flag(key.name, *flag);
     } else if (int* integer = std::get_if<int>(&value)) {
-      *integer = solver.integer(key.name, key.range, *integer);
+      *integer = section.integer(key.name, key.range, *integer);
     } else if (double* number = std::get_if<double>(&value)) {
-      *number = solver.number(key.name, key.range, *number);
+      *number = section.number(key.name, key.range, *number);
     } else {
       std::string& text = std::get<std::string>(value);
-      text = solver.choice(key.name, key.choices, text);
+      text = section.choice(key.name, key.choices, text);
     }
+  }
+}
+
+ContactOptions::ContactOptions(Section const& section) : Options(contact_keys(), section) {
+  if (text("stiffness") == "given" && number("pressure") == 0) {
+    throw Error(
+        "{}: stiffness = \"given\" needs a pressure: give the modulus in Pa of the layer between "
+        "bodies, about that of the softest of them",
+        section.where());
   }
 }
 

@@ -1,5 +1,5 @@
-// The keys of [solver]: names, types, ranges and defaults in one table, which the scene file,
-// `--set` and the help of the program all go through.
+// The keys of [solver] and [contact]: names, types, ranges and defaults in one table each, which
+// the scene file, `--set` and the help of the program all go through.
 #pragma once
 
 #include <taut/apps/program/scene_value.hpp>
@@ -10,7 +10,7 @@ namespace taut {
 
 using OptionValue = std::variant<bool, int, double, std::string>;
 
-struct SolverKey {
+struct OptionKey {
   std::string_view name;
   OptionValue fallback;                   ///< also fixes the type
   Range range;                            ///< of numbers
@@ -19,13 +19,15 @@ struct SolverKey {
 };
 
 /// Every key that [solver] knows.
-std::span<SolverKey const> solver_keys();
+std::span<OptionKey const> solver_keys();
+/// Every key that [contact] knows.
+std::span<OptionKey const> contact_keys();
 
-/// A value for every key of [solver].
-class SolverOptions {
+/// A value for every key of a table.
+class Options {
 public:
-  SolverOptions();  ///< the defaults
-  explicit SolverOptions(Section const& solver);
+  explicit Options(std::span<OptionKey const> keys);  ///< the defaults
+  Options(std::span<OptionKey const> keys, Section const& section);
 
   bool flag(std::string_view key) const { return get<bool>(key); }
   int integer(std::string_view key) const { return get<int>(key); }
@@ -39,6 +41,17 @@ private:
   }
 
   std::map<std::string, OptionValue, std::less<>> values_;
+};
+
+struct SolverOptions : Options {
+  SolverOptions() : Options(solver_keys()) {}
+  explicit SolverOptions(Section const& section) : Options(solver_keys(), section) {}
+};
+
+struct ContactOptions : Options {
+  ContactOptions() : Options(contact_keys()) {}
+  /// Throws Error also for values that do not go together.
+  explicit ContactOptions(Section const& section);
 };
 
 }  // namespace taut

@@ -1,9 +1,13 @@
+#include <taut/apps/program/contact_terms.hpp>
 #include <taut/apps/program/methods.hpp>
 #include <taut/apps/program/simulation.hpp>
 #include <taut/core/fem/ordering.hpp>
 #include <taut/core/fem/rest_shape.hpp>
 #include <taut/core/report/error.hpp>
 
+#include <fmt/ranges.h>
+
+#include <algorithm>
 #include <cmath>
 
 namespace taut {
@@ -65,7 +69,7 @@ public:
         observer({i.index, i.energy_change_so_far, i.error_estimate, [&] { return read(i.x); }});
       };
     }
-    NewtonReport const report = advance(h, inner);
+    NewtonReport const report = advance_or_say(h, inner);
     if (report.stop == Stop::non_finite) {
       auto const inverted = inverted_tets(geometry_.mesh, read(reached_));
       throw Error(
@@ -82,6 +86,10 @@ public:
 
   double time() const override { return state_.time; }
   int steps() const override { return state_.steps; }
+  std::optional<ContactReport> contact() const override {
+    if (!contact_) return {};
+    return contact_->report(state_.x);
+  }
   std::vector<Point> positions() const override { return read(state_.x); }
   std::vector<Point> velocities() const override { return read(state_.v); }
 
@@ -120,7 +128,7 @@ private:
     return density;
   }
 
-  ProgramPotential<P> make_potential() const {
+  ProgramPotential<P> make_potential() {
     std::vector<double> mass;
     for (std::int32_t v : order_.vertices) mass.push_back(lumped_[v]);
     Unknowns<P> const unknowns(mass, mean_edge_length(geometry_.mesh));
@@ -138,9 +146,45 @@ private:
         return true;
       });
     }
+    AnySteppedTerms<P, DefaultSpace> told;
+    if (scene_.contact) add_contact(told, unknowns);
     Point const& g = scene_.gravity;
     return ProgramPotential<P>(unknowns, Inertia<P>(unknowns),
-                               BodyForce<P>(unknowns, {g[0], g[1], g[2]}), terms);
+                               BodyForce<P>(unknowns, {g[0], g[1], g[2]}), terms, told);
+  }
+
+  void add_contact(AnySteppedTerms<P, DefaultSpace>& terms, Unknowns<P> const& unknowns) {
+    std::vector<Triangle> triangles = boundary_faces(geometry_.mesh.tets);
+    for (Triangle& t : triangles)
+      for (auto& v : t) v = order_.new_vertex[v];
+    std::vector<int> object(size());
+    for (std::size_t k = 0; k < geometry_.objects.size(); ++k) {
+      ObjectPart const& part = geometry_.objects[k];
+      for (int v = 0; v < part.vertices; ++v) {
+        object[order_.new_vertex[part.first_vertex + v]] = static_cast<int>(k);
+      }
+    }
+    ContactPart<P> part{unknowns, make_surface(std::move(triangles), std::move(object)), {}};
+    for (std::int32_t v : order_.vertices) part.rest.push_back(geometry_.mesh.points[v]);
+    contact_ = add_contact_term<P>(terms, part, *scene_.contact);
+    for (ObjectPart const& body : geometry_.objects) refuse_small(body, contact_->dhat());
+  }
+  /// A body that is nowhere further from another side of itself than dhat.
+  void refuse_small(ObjectPart const& body, double dhat) const {
+    auto const first = geometry_.mesh.points.begin() + body.first_vertex;
+    double largest = 0;
+    for (int c = 0; c < 3; ++c) {
+      auto const [low, high] =
+          std::minmax_element(first, first + body.vertices,
+                              [&](Point const& a, Point const& b) { return a[c] < b[c]; });
+      largest = std::max(largest, (*high)[c] - (*low)[c]);
+    }
+    if (dhat < largest) return;
+    throw Error(
+        "{}: contact begins to act at {:.3g} m (contact.dhat), but object {} is only {:.3g} m "
+        "long: "
+        "reduce contact.dhat",
+        scene_.file.string(), dhat, body.name, largest);
   }
 
   ElasticPart part_of(std::string const& model) const {
@@ -210,6 +254,41 @@ private:
     potential_.template term<BodyForce<P>>().set_forces(any ? forces_ : Vectors());
   }
 
+  /// Names what holds up pins.
+  NewtonReport advance_or_say(double h, Observer<P, DefaultSpace> const& observer) {
+    try {
+      return advance(h, observer);
+    } catch (HeldUp const& held) {
+      std::vector<std::string> pins;
+      for (Pin const& pin : geometry_.pins) {
+        if (pin.window.covers_step(state_.time + h, h)) pins.push_back(pin.name);
+      }
+      auto const& unknowns = held.by().unknowns;
+      throw Error(
+          "step {} at {:.6g} s: what moves by script ({}) is held up by {}{}{}: let it move less "
+          "or "
+          "slower, give the bodies room, or release the pin",
+          state_.steps + 1, state_.time, fmt::join(pins, ", "), held.by().what,
+          unknowns.empty() ? "" : ", ", names_of(unknowns));
+    }
+  }
+  /// "vertex 12 of mat, vertices 3, 4, 5 of floor", numbered as in the meshes of the objects.
+  std::string names_of(std::vector<int> const& unknowns) const {
+    std::string text;
+    for (ObjectPart const& body : geometry_.objects) {
+      std::vector<int> inside;
+      for (int i : unknowns) {
+        int const v = order_.vertices[i] - body.first_vertex;
+        if (v >= 0 && v < body.vertices) inside.push_back(v);
+      }
+      if (inside.empty()) continue;
+      text += fmt::format("{}{} {} of {}", text.empty() ? "" : ", ",
+                          inside.size() == 1 ? "vertex" : "vertices", fmt::join(inside, ", "),
+                          body.name);
+    }
+    return text;
+  }
+
   NewtonReport advance(double h, Observer<P, DefaultSpace> const& observer) {
     auto const run = [&](auto& stepper) {
       NewtonReport const report = stepper.step(potential_, state_, h, observer);
@@ -253,7 +332,8 @@ private:
   Scene scene_;
   SceneGeometry geometry_;
   Ordering order_;
-  std::vector<double> lumped_;  ///< in the mesh's order
+  std::vector<double> lumped_;                        ///< in the mesh's order
+  std::shared_ptr<ProgramContact<P> const> contact_;  ///< null: nothing keeps bodies apart
   ProgramPotential<P> potential_;
   State<P> state_;
   Positions reached_;  ///< by the last minimisation, also where the step was then refused

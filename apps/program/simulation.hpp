@@ -4,11 +4,13 @@
 #pragma once
 
 #include <taut/apps/program/scene_geometry.hpp>
+#include <taut/contact/contact.hpp>
 #include <taut/core/io/checkpoint.hpp>
 #include <taut/integrators/newton.hpp>
 
 #include <functional>
 #include <memory>
+#include <optional>
 
 namespace taut {
 
@@ -25,16 +27,19 @@ class Simulation {
 public:
   virtual ~Simulation() = default;
 
-  /// Discretises the scene. Throws Error if it asks for what does not exist, or starts with an
-  /// inverted element of a material that forbids it.
+  /// Discretises the scene. Throws Error if it asks for what does not exist, starts with an
+  /// inverted element of a material that forbids it, or has a body smaller than the distance of
+  /// contact.
   static std::unique_ptr<Simulation> create(Scene const& scene, SceneGeometry const& geometry);
 
-  /// One time step. Throws Error if the energy stops being a number, naming the elements; the state
-  /// is then that before the step.
+  /// One time step. Throws Error if the energy stops being a number, naming the elements, or if
+  /// pins are held up, naming by what; the state is then that before the step.
   virtual NewtonReport step(IterationObserver const& observer = {}) = 0;
 
   virtual double time() const = 0;
   virtual int steps() const = 0;
+  /// What contact amounts to now; nothing in a scene without.
+  virtual std::optional<ContactReport> contact() const = 0;
   virtual std::vector<Point> positions() const = 0;   ///< m
   virtual std::vector<Point> velocities() const = 0;  ///< m/s
 

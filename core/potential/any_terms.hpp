@@ -1,18 +1,22 @@
 // Swept terms that are chosen at run time: a list of terms of any types behind one type. A call is
 // a whole sweep, so the indirection costs nothing; the inner loops stay those of the concrete
 // terms.
+//
+// Two types: `AnySteppedTerms` holds terms that are told when a step begins, `AnyTerms` those that
+// are not, for a potential tells the first what the second amount to.
 #pragma once
 
 #include <taut/core/potential/term.hpp>
 
+#include <algorithm>
 #include <limits>
 #include <memory>
 #include <vector>
 
 namespace taut {
 
-template <class Precision_ = Mixed, class Space_ = DefaultSpace>
-class AnyTerms {
+template <class Precision_, class Space_, bool stepped>
+class TermList {
 public:
   using Space = Space_;
   using Precision = Precision_;
@@ -24,6 +28,9 @@ public:
 
   template <SweptTerm Term>
   void add(Term term) {
+    static_assert(SteppedTerm<Term> == stepped,
+                  "taut: a term with begin_step belongs into AnySteppedTerms, any other into "
+                  "AnyTerms");
     terms_.push_back(std::make_shared<Holder<Term> const>(std::move(term)));
   }
 
@@ -72,6 +79,34 @@ public:
   void elements(std::vector<Connectivity>& kinds) const {
     for (auto const& t : terms_) t->elements(kinds);
   }
+  std::int64_t pattern_version(Positions const& x) const {
+    std::int64_t version = 0;
+    for (auto const& t : terms_) version += t->pattern_version(x);
+    return version;
+  }
+  std::optional<Obstruction> obstruction() const {
+    for (auto t = terms_.rbegin(); t != terms_.rend(); ++t) {
+      if (auto found = (*t)->obstruction()) return found;
+    }
+    return {};
+  }
+  bool empty() const { return terms_.empty(); }
+
+  void begin_step(StepStart<Precision, Space> const& start) const requires stepped {
+    for (auto const& t : terms_) t->begin_step(start);
+  }
+  double motion_left(Positions const& x) const requires stepped {
+    double left = 0;
+    for (auto const& t : terms_) left = std::max(left, t->motion_left(x));
+    return left;
+  }
+  double max_advance(Positions const& x, Vectors const& p, double at_most) const requires stepped {
+    for (auto const& t : terms_) at_most = t->max_advance(x, p, at_most);
+    return at_most;
+  }
+  void advance(double fraction) const requires stepped {
+    for (auto const& t : terms_) t->advance(fraction);
+  }
 
 private:
   struct Interface {
@@ -96,6 +131,12 @@ private:
     virtual double max_step(Positions const&, Vectors const&, double) const = 0;
     virtual double max_prescribed_step(Positions const&, Vectors const&, double) const = 0;
     virtual void elements(std::vector<Connectivity>&) const = 0;
+    virtual std::int64_t pattern_version(Positions const&) const = 0;
+    virtual std::optional<Obstruction> obstruction() const = 0;
+    virtual void begin_step(StepStart<Precision, Space> const&) const = 0;
+    virtual double motion_left(Positions const&) const = 0;
+    virtual double max_advance(Positions const&, Vectors const&, double) const = 0;
+    virtual void advance(double) const = 0;
   };
 
   template <class Term>
@@ -148,6 +189,28 @@ private:
       return term.max_prescribed_step(x, p, at_most);
     }
     void elements(std::vector<Connectivity>& kinds) const override { term.elements(kinds); }
+    std::int64_t pattern_version(Positions const& x) const override {
+      if constexpr (ChangingTerm<Term>) return term.pattern_version(x);
+      return 0;
+    }
+    std::optional<Obstruction> obstruction() const override {
+      if constexpr (ObstructedTerm<Term>) return term.obstruction();
+      return {};
+    }
+    void begin_step(StepStart<Precision, Space> const& start) const override {
+      if constexpr (SteppedTerm<Term>) term.begin_step(start);
+    }
+    double motion_left(Positions const& x) const override {
+      if constexpr (MovingTerm<Term>) return term.motion_left(x);
+      return 0;
+    }
+    double max_advance(Positions const& x, Vectors const& p, double at_most) const override {
+      if constexpr (MovingTerm<Term>) return term.max_advance(x, p, at_most);
+      return at_most;
+    }
+    void advance(double fraction) const override {
+      if constexpr (MovingTerm<Term>) term.advance(fraction);
+    }
   };
 
   template <class Part>
@@ -159,5 +222,10 @@ private:
 
   std::vector<std::shared_ptr<Interface const>> terms_;
 };
+
+template <class Precision = Mixed, class Space = DefaultSpace>
+using AnyTerms = TermList<Precision, Space, false>;
+template <class Precision = Mixed, class Space = DefaultSpace>
+using AnySteppedTerms = TermList<Precision, Space, true>;
 
 }  // namespace taut

@@ -10,6 +10,7 @@
 #include <taut/core/sparse/block_csr.hpp>
 
 #include <concepts>
+#include <cstdint>
 
 namespace taut {
 
@@ -56,8 +57,10 @@ concept Objective =
   { e.quadratic_form(x, p) } -> std::convertible_to<double>;
   /// hp = H(x) p, with the curvature projected exactly.
   {e.product(x, p, p)};
-  /// H(x), with the curvature projected exactly, into a matrix made by `pattern()`.
-  { e.pattern() } -> std::same_as<BlockCsr<typename E::Space, double>>;
+  /// H(x), with the curvature projected exactly, into a matrix made by `pattern(x)`, be it long ago
+  /// and at another x, as long as `pattern_version(x)` is what it was then.
+  { e.pattern(x) } -> std::same_as<BlockCsr<typename E::Space, double>>;
+  { e.pattern_version(x) } -> std::convertible_to<std::int64_t>;
   {e.assemble(x, matrix)};
   /// Largest alpha in (0, at_most] such that x + a p is valid for all a < alpha (an element that
   /// forbids inversion reaches J = 0 there). Proving a step as long as one wants valid is much

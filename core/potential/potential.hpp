@@ -208,6 +208,19 @@ struct Predict {
   }
 };
 
+/// A third of the trace of the curvature of each unknown, times `factor`.
+template <class S, class Precision>
+struct MeanCurvature {
+  using Real = typename Precision::real;
+  VectorField<Real, S> diagonal;
+  double factor;
+  Array<Real, S> mean;
+  KOKKOS_FUNCTION void operator()(int i) const {
+    double const trace = double(diagonal(i, 0)) + double(diagonal(i, 1)) + double(diagonal(i, 2));
+    mean(i) = static_cast<Real>(factor * trace / 3);
+  }
+};
+
 template <class S, class Precision>
 struct FreeMass {
   FixedMask<S> fixed;
@@ -247,13 +260,18 @@ public:
         reducer_(unknowns.size(), 1),
         mass_reducer_(unknowns.size(), 1) {}
 
-  /// The time integrator says what the step is: the factor of all energies but the inertia (h^2 for
-  /// implicit Euler), and the step that turns errors of position into errors of velocity.
-  void begin_step(double scale, double time_step, bool has_inertia) {
+  /// The time integrator says what the step is: where it starts, the factor of all energies but the
+  /// inertia (h^2 for implicit Euler), and the step that turns errors of position into errors of
+  /// velocity.
+  void begin_step(Positions const& x, double scale, double time_step, bool has_inertia) {
     scale_ = scale;
     kernels::FreeMass<Space, Precision> const free_mass{unknowns_.fixed, unknowns_.mass};
     double const mass = mass_reducer_.template sum<1>("free_mass", size(), free_mass)[0];
     step_ = {mass, unknowns_.length, time_step, has_inertia};
+    if constexpr ((SteppedTerm<Terms> || ...)) {
+      StepStart<Precision, Space> const start{x, time_step, stiffness_of_untold(x)};
+      for_each_of<is_stepped>([&](auto const& term) { term.begin_step(start); });
+    }
   }
 
   template <class Term>
@@ -325,7 +343,14 @@ public:
     for_each_swept([&](auto const& term) { term.add_product(x, p, scale_, unknowns_.fixed, hp); });
   }
 
-  Matrix pattern() const {
+  /// Changes where pattern(x) does.
+  std::int64_t pattern_version(Positions const& x) const {
+    std::int64_t version = 0;
+    for_each_of<is_changing>([&](auto const& term) { version += term.pattern_version(x); });
+    return version;
+  }
+  Matrix pattern(Positions const& x) const {
+    pattern_version(x);
     std::vector<Connectivity> kinds;
     for_each_swept([&](auto const& term) { term.elements(kinds); });
     return Matrix(pattern_from_elements(size(), kinds));
@@ -344,10 +369,11 @@ public:
     return at_most;
   }
 
-  /// As `max_step`, for motion that is prescribed: no element may fold, whatever its material.
+  /// As `max_step`, for motion that is prescribed: no element may fold, whatever its material, and
+  /// what moves by itself goes its share of the way as well.
   double max_prescribed_step(Positions const& x, Vectors const& p, double at_most) const {
     for_each_swept([&](auto const& term) { at_most = term.max_prescribed_step(x, p, at_most); });
-    return at_most;
+    return max_advance(x, p, at_most);
   }
 
   /// Moves free unknowns by one Newton step on the local terms alone: from x + h v to the predictor
@@ -358,31 +384,44 @@ public:
     for_each<Space>("predict", size(), Kernel{local, unknowns_.fixed, x});
   }
 
-  /// Fixed unknowns go a fifth of the way to where the first element would fold, then the free ones
-  /// follow (minimiser iterations), and so on until all have arrived. In greater strides the gaps
-  /// would close faster than an iteration can open them.
+  /// Fixed unknowns, and what else moves, go a fifth of the way to where the first element would
+  /// fold or the first pair touch, then the free ones follow (minimiser iterations), and so on
+  /// until all have arrived. In greater strides the gaps would close faster than an iteration can
+  /// open them. Throws HeldUp where there is no way left.
   bool advance_prescribed(Positions const& x) const {
     using Direction = kernels::PrescribedDirection<Space, Precision>;
-    double const distance =
+    double const pins =
         maximum<Space>("prescribed_direction", size(), 0.0,
                        Direction{unknowns_.fixed, x, unknowns_.prescribed, direction_});
+    double const distance = Kokkos::max(pins, motion_left(x));
     if (distance == 0) return false;
     // Materials that tolerate inversion may have to fold (a push faster than sound): there the
     // motion is not held up for ever.
     constexpr double stride = 0.2;
-    double const allowed = stride * max_step(x, direction_, 1 / stride);
+    double const allowed = stride * max_advance(x, direction_, max_step(x, direction_, 1 / stride));
     double const patience = distance < 1e-3 * unknowns_.length ? 1.0 : 0.125;
     double const unfolded = stride * max_prescribed_step(x, direction_, 1 / stride);
     double const fraction = Kokkos::min(1.0, Kokkos::max(unfolded, Kokkos::min(patience, allowed)));
     if (!(fraction * distance > 1e-12 * unknowns_.length) && fraction < 1) {
-      throw Error(
-          "the prescribed motion folds an element that is already flat: reduce the motion per step "
-          "or release the pinned vertices around it");
+      throw HeldUp(what_obstructs(x, direction_));
     }
     for_each<Space>("move_prescribed", size(),
                     kernels::MovePrescribed<Space, Precision>{unknowns_.fixed, x,
                                                               unknowns_.prescribed, fraction});
+    advance(fraction);
     return true;
+  }
+
+  /// How far what moves by itself has still to go, m.
+  double motion_left(Positions const& x) const {
+    double left = 0;
+    for_each_of<is_moving>(
+        [&](auto const& term) { left = Kokkos::max(left, term.motion_left(x)); });
+    return left;
+  }
+  /// It goes by this fraction of that; by 1 it arrives.
+  void advance(double fraction) const {
+    for_each_of<is_moving>([&](auto const& term) { term.advance(fraction); });
   }
 
 private:
@@ -404,13 +443,66 @@ private:
     }
   }
 
+  // Kinds of terms, as types: a lambda cannot take a concept.
+  template <class Term>
+  using is_swept = std::bool_constant<SweptTerm<Term>>;
+  template <class Term>
+  using is_stepped = std::bool_constant<SteppedTerm<Term>>;
+  template <class Term>
+  using is_untold = std::bool_constant<SweptTerm<Term> && !SteppedTerm<Term>>;
+  template <class Term>
+  using is_changing = std::bool_constant<ChangingTerm<Term>>;
+  template <class Term>
+  using is_moving = std::bool_constant<MovingTerm<Term>>;
+
+  template <template <class> class Kind, class Visit>
+  void for_each_of(Visit const& visit) const {
+    std::apply([&](auto const&... term) { (visit_if<Kind>(term, visit), ...); }, terms_);
+  }
+  template <template <class> class Kind, class Term, class Visit>
+  static void visit_if(Term const& term, Visit const& visit) {
+    if constexpr (Kind<Term>::value) visit(term);
+  }
   template <class Visit>
   void for_each_swept(Visit const& visit) const {
-    std::apply([&](auto const&... term) { (visit_swept(term, visit), ...); }, terms_);
+    for_each_of<is_swept>(visit);
   }
-  template <class Term, class Visit>
-  static void visit_swept(Term const& term, Visit const& visit) {
-    if constexpr (SweptTerm<Term>) visit(term);
+
+  double max_advance(Positions const& x, Vectors const& p, double at_most) const {
+    for_each_of<is_moving>([&](auto const& term) { at_most = term.max_advance(x, p, at_most); });
+    return at_most;
+  }
+
+  Array<Real, Space> stiffness_of_untold(Positions const& x) {
+    if (stiffness_.extent_int(0) != size()) {
+      stiffness_ = Array<Real, Space>("stiffness", size());
+      diagonal_ = Vectors("stiffness_diagonal", size());
+    }
+    local_gradient<3>(x, direction_, diagonal_);
+    for_each_of<is_untold>([&](auto const& term) {
+      term.add_gradient(x, scale_, unknowns_.fixed, direction_, diagonal_);
+    });
+    for_each<Space>("stiffness", size(),
+                    kernels::MeanCurvature<Space, Precision>{diagonal_, 1 / scale_, stiffness_});
+    return stiffness_;
+  }
+
+  /// What cuts a step along p the shortest.
+  Obstruction what_obstructs(Positions const& x, Vectors const& p) const {
+    double shortest = std::numeric_limits<double>::infinity();
+    Obstruction by{"an element that is already flat", {}};
+    for_each_swept([&](auto const& term) {
+      double reach = term.max_prescribed_step(x, p, 1.0);
+      if constexpr (MovingTerm<std::decay_t<decltype(term)>>) {
+        reach = term.max_advance(x, p, reach);
+      }
+      if (!(reach < shortest)) return;
+      shortest = reach;
+      if constexpr (ObstructedTerm<std::decay_t<decltype(term)>>) {
+        if (auto found = term.obstruction()) by = *found;
+      }
+    });
+    return by;
   }
 
   template <int numbers, class CurvatureField>
@@ -446,6 +538,8 @@ private:
   Unknowns<Precision, Space> unknowns_;
   std::tuple<Terms...> terms_;
   Vectors direction_;
+  Array<Real, Space> stiffness_;  ///< where terms are told of it
+  Vectors diagonal_;
   Reducer<Space, typename Precision::sum> reducer_;
   Reducer<Space, double> mass_reducer_;
   double scale_ = 1;

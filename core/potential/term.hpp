@@ -11,9 +11,14 @@
 
 #include <taut/core/exec/space.hpp>
 #include <taut/core/math/matrix.hpp>
+#include <taut/core/potential/obstruction.hpp>
 #include <taut/core/sparse/block_csr.hpp>
 
 #include <concepts>
+#include <cstdint>
+#include <optional>
+#include <string>
+#include <vector>
 
 namespace taut {
 
@@ -65,6 +70,57 @@ concept SweptTerm = requires(
   /// For the sparsity pattern: appends the term's elements, one entry for each number of unknowns
   /// that they couple. The entries refer to memory of the term.
   {term.elements(kinds)};
+};
+
+// What a swept term may have besides. Copies of a term that has state share it.
+
+/// What a step begins with.
+template <class Precision, class S>
+struct StepStart {
+  VectorField<typename Precision::position, S> x;  ///< where it starts, m
+  double time_step = 0;                            ///< h, s
+  /// What resists a motion of each unknown, N/m: a third of the trace of its block in the Hessian
+  /// of all terms that are not told (with inertia, m / h^2 and what is elastic), at x.
+  Array<typename Precision::real, S> stiffness;
+};
+
+/// A term that is told when a step begins. It may then become another function of x, and must not
+/// within the step, unless `advance` (below) says so.
+template <class Term>
+concept SteppedTerm = SweptTerm<Term> &&
+    requires(Term const& term, StepStart<typename Term::Precision, typename Term::Space> start) {
+  {term.begin_step(start)};
+};
+
+/// A term whose elements change with x. The version grows with each change; asking for it brings
+/// the elements up to x.
+template <class Term>
+concept ChangingTerm = SweptTerm<Term> &&
+    requires(Term const& term,
+             VectorField<typename Term::Precision::position, typename Term::Space> x) {
+  { term.pattern_version(x) } -> std::convertible_to<std::int64_t>;
+};
+
+/// A term in which something moves by itself (an obstacle), to where it is to be at the end of the
+/// step, in portions, as prescribed unknowns do.
+template <class Term>
+concept MovingTerm = SweptTerm<Term> &&
+    requires(Term const& term,
+             VectorField<typename Term::Precision::position, typename Term::Space> x,
+             VectorField<typename Term::Precision::real, typename Term::Space> p, double at_most) {
+  /// How far it has still to go, m; 0 once it has arrived.
+  { term.motion_left(x) } -> std::convertible_to<double>;
+  /// The largest valid fraction, up to `at_most`, of what it has still to go while unknowns move by
+  /// the same fraction of p.
+  { term.max_advance(x, p, at_most) } -> std::convertible_to<double>;
+  /// Goes by this fraction; by 1 it arrives.
+  {term.advance(at_most)};
+};
+
+/// A term that can say what its last max_step or max_prescribed_step was cut by.
+template <class Term>
+concept ObstructedTerm = SweptTerm<Term> && requires(Term const& term) {
+  { term.obstruction() } -> std::same_as<std::optional<Obstruction>>;
 };
 
 }  // namespace taut

@@ -120,7 +120,7 @@ TEST_CASE("the contact term is a term, chosen at compile time or at run time", "
   STATIC_REQUIRE(SweptTerm<Contact<>>);
   STATIC_REQUIRE(SweptTerm<ContactIn<Fp32, Left>>);
   Fixture<Mixed> f;
-  AnyTerms<> terms;
+  AnySteppedTerms<> terms;
   terms.add(f.contact);
   CHECK(terms.value(f.x, 2.0) == f.contact.value(f.x, 2.0));
 }
@@ -202,8 +202,8 @@ TEST_CASE("energy, gradient, curvature and matrix belong together", "[contact]")
   CHECK(form > 0);
   CHECK_THAT(product_of(to_points(f.g), f.scene.p), WithinRel(form, 1e-12));
   Potential potential(f.unknowns, f.contact);
-  potential.begin_step(scale, 0.5, false);
-  auto const matrix = potential.pattern();
+  potential.begin_step(f.x, scale, 0.5, false);
+  auto const matrix = potential.pattern(f.x);
   potential.assemble(f.x, matrix);
   CHECK(asymmetry(matrix) < 1e-12 * form);
   typename Fixture<Fp64>::Term::Vectors hp("hp", f.scene.size());
@@ -217,10 +217,12 @@ TEST_CASE("a matrix made for other candidates is refused before it is written to
   for (std::size_t v = 0; v < apart.size(); ++v) {
     if (f.scene.surface.object[v] == 1) apart[v][1] += 1;
   }
-  f.contact.value(soups::to_field<double, DefaultSpace>(apart), 1);
   Potential potential(f.unknowns, f.contact);
-  potential.begin_step(1, 1, false);
-  auto const old = potential.pattern();
+  auto const at_apart = soups::to_field<double, DefaultSpace>(apart);
+  potential.begin_step(at_apart, 1, 1, false);
+  auto const version = potential.pattern_version(at_apart);
+  auto const old = potential.pattern(at_apart);
+  CHECK(potential.pattern_version(at_apart) == version);
   CHECK_THROWS_WITH(f.contact.add_to(old, f.x, 1, f.unknowns.fixed),
                     ContainsSubstring("make the pattern anew"));
   auto const blocks = Kokkos::create_mirror_view_and_copy(Kokkos::HostSpace(), old.block);
@@ -228,7 +230,8 @@ TEST_CASE("a matrix made for other candidates is refused before it is written to
   for (std::size_t k = 0; k < blocks.extent(0); ++k)
     for (double a : blocks(k).a) written = written || a != 0;
   CHECK_FALSE(written);
-  auto const anew = potential.pattern();
+  CHECK(potential.pattern_version(f.x) != version);
+  auto const anew = potential.pattern(f.x);
   CHECK_NOTHROW(f.contact.add_to(anew, f.x, 1, f.unknowns.fixed));
 }
 
@@ -262,7 +265,7 @@ TEST_CASE("rows of fixed vertices are left alone, and pairs of them are none", "
   auto const mask = Kokkos::create_mirror_view(f.unknowns.fixed);
   for (int v = 0; v < f.scene.size(); ++v) mask(v) = f.scene.surface.object[v] == 0;
   Kokkos::deep_copy(f.unknowns.fixed, mask);
-  f.contact.fixed_changed();
+  f.contact.begin_step({f.x, 1, {}});
   Kokkos::deep_copy(f.g, 7);
   Kokkos::deep_copy(f.blocks, 7);
   f.contact.add_gradient(f.x, 1, f.unknowns.fixed, f.g, f.blocks);
@@ -279,7 +282,7 @@ TEST_CASE("rows of fixed vertices are left alone, and pairs of them are none", "
   CHECK(alone);
   CHECK(moved);
   Kokkos::deep_copy(f.unknowns.fixed, 1);
-  f.contact.fixed_changed();
+  f.contact.begin_step({f.x, 1, {}});
   CHECK(f.contact.value(f.x, 1) == 0);
   CHECK(f.contact.max_step(f.x, f.p, 100.0) == 100.0);
 }
@@ -420,15 +423,15 @@ TEST_CASE("stiffness may follow what the vertices resist with", "[contact]") {
   ContactIn<Fp64, DefaultSpace, SpatialHash<>, ElasticInclusiveStiffness> contact(
       unknowns, s.surface, s.rest, {.dhat = Squashed::dhat});
   auto const x = soups::to_field<double, DefaultSpace>(s.x);
-  CHECK_THROWS_WITH(contact.value(x, 1), ContainsSubstring("set_vertex_stiffness"));
+  CHECK_THROWS_WITH(contact.value(x, 1), ContainsSubstring("call begin_step"));
   Array<double, DefaultSpace> const field("stiffness", s.size());
   Kokkos::deep_copy(field, 100);
-  contact.set_vertex_stiffness(field);
+  contact.begin_step({x, 1, field});
   double const one = contact.value(x, 1);
   CHECK(one > 0);
   Kokkos::deep_copy(field, 300);  // copied: nothing changes within the step
   CHECK(contact.value(x, 1) == one);
-  contact.set_vertex_stiffness(field);
+  contact.begin_step({x, 1, field});
   CHECK_THAT(contact.value(x, 1), WithinRel(3 * one, 1e-12));
   // A fixed vertex is no measure.
   auto const mask = Kokkos::create_mirror_view(unknowns.fixed);
@@ -439,12 +442,11 @@ TEST_CASE("stiffness may follow what the vertices resist with", "[contact]") {
   }
   Kokkos::deep_copy(unknowns.fixed, mask);
   Kokkos::deep_copy(field, host);
-  contact.fixed_changed();
-  contact.set_vertex_stiffness(field);
+  contact.begin_step({x, 1, field});
   double const free = contact.value(x, 1);
   CHECK(free > 0);
   CHECK(free <= one * (1 + 1e-12));
-  CHECK_THROWS_WITH(contact.set_vertex_stiffness(Array<double, DefaultSpace>("short", 3)),
+  CHECK_THROWS_WITH(contact.begin_step({x, 1, Array<double, DefaultSpace>("short", 3)}),
                     ContainsSubstring("3 vertices"));
 }
 

@@ -1,6 +1,7 @@
 // The kernels of the contact term, instantiated once (see all_kernels.cu).
 #include <taut/contact/bvh.hpp>
 #include <taut/contact/contact.hpp>
+#include <taut/core/potential/potential.hpp>
 
 using namespace taut;
 
@@ -10,8 +11,10 @@ template class taut::Contact<PairEnergy<LogBarrier, TruncatedCurvature, NoMollif
 template class taut::Contact<PairEnergy<Normalised<IpcBarrier>, ExactCurvature>,
                              SpatialHash<DefaultSpace>, AdditiveCcd, GivenStiffness, Fp32>;
 
-/// Any term that couples vertices may stand for the elastic one.
-Array<float, DefaultSpace> vertex_stiffness(Contact<> const& term, Unknowns<> const& unknowns,
-                                            VectorField<double, DefaultSpace> const& x) {
-  return InclusiveStiffness<>().at(term, unknowns, x, 0.01);
+/// The potential's kernels for terms that are told when a step begins.
+Potential<Inertia<>, Contact<>> begin(Unknowns<> const& unknowns, Contact<> const& contact,
+                                      VectorField<double, DefaultSpace> const& x) {
+  Potential<Inertia<>, Contact<>> potential(unknowns, Inertia<>(unknowns), contact);
+  potential.begin_step(x, 1e-4, 0.01, true);
+  return potential;
 }

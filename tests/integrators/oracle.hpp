@@ -42,7 +42,7 @@ typename Chain<Bond>::Positions minimum(Chain<Bond> const& chain,
   typename Chain<Bond>::Positions const at("minimum", n);
   typename Chain<Bond>::Field const g("gradient", n), p("step", n);
   Kokkos::deep_copy(at, x);
-  auto hessian = chain.pattern();
+  auto hessian = chain.pattern(x);
   for (int iteration = 0; iteration < 200; ++iteration) {
     chain.gradient(at, g);
     chain.assemble(at, hessian);

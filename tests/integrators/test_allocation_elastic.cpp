@@ -44,8 +44,8 @@ TEMPLATE_TEST_CASE("iterations on tets, inertia and gravity allocate nothing", "
   auto potential = bar.potential({0, -9.81, 0});
   bool const has_inertia = GENERATE(true, false);
   potential.template term<Inertia<Fp64>>().switch_on(has_inertia);
-  potential.begin_step(has_inertia ? 1e-4 : 1, 0.01, has_inertia);
   auto const x = bar.positions();
+  potential.begin_step(x, has_inertia ? 1e-4 : 1, 0.01, has_inertia);
   auto const run = [&](int iterations) {
     typename TestType::Params params;
     params.stop.tolerance = 0;

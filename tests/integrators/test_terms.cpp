@@ -110,7 +110,7 @@ void check_derivatives(E& e, Field const& x, Field const& p, double unit) {
   CHECK(worst < 1e-5 * unit);
   CHECK_THAT(e.quadratic_form(x, p), WithinRel(product_of(p, hp), 1e-10));
 
-  auto matrix = e.pattern();
+  auto matrix = e.pattern(x);
   e.assemble(x, matrix);
   product(matrix, p, again);
   CHECK(largest_difference(again, hp) < 1e-12 * unit);
@@ -138,17 +138,17 @@ TEMPLATE_TEST_CASE("stencils of three, also where they name an unknown twice", "
   unknowns.fixed(4) = 1;
   Term const term({}, {{0, 1, 2}, {2, 1, 2}, {3, 3, 0}, {1, 4, 3}, {4, 4, 4}}, 5);
   Potential<Inertia<Fp64, S>, Term> e(unknowns, Inertia<Fp64, S>(unknowns), term);
-  e.begin_step(0.25, 0.5, true);
   using Field = VectorField<double, S>;
   auto const x = random_field<Field>(5, 1, 1), p = random_field<Field>(5, 1, 2);
   for (int c = 0; c < 3; ++c) p(4, c) = 0;
+  e.begin_step(x, 0.25, 0.5, true);
   check_derivatives(e, x, p, 100);
 
   // The curvature of a term, block for block.
   BlockField<double, S> const blocks("blocks", 5);
   Field const g("g", 5);
   e.gradient(x, g, blocks);
-  auto matrix = e.pattern();
+  auto matrix = e.pattern(x);
   e.assemble(x, matrix);
   for (int i = 0; i < 5; ++i) {
     Mat3<double> const h = matrix.block(matrix.find(i, i));
@@ -200,7 +200,7 @@ TEST_CASE("a whole potential: tets, elements of two and of four, inertia, forces
   terms.add(StencilTerm<Bend<2>, Fp64>({}, {{0, n - 1}, {2, n - 3}}, n));
   BodyForce<Fp64> const force(bar.unknowns, {0, -9.81, 0});
   Potential e(bar.unknowns, Inertia<Fp64>(bar.unknowns), force, terms);
-  e.begin_step(0.01, 0.1, true);
+  e.begin_step(bar.positions(), 0.01, 0.1, true);
 
   SECTION("its derivatives") {
     // Drawn out everywhere: nothing is projected then.

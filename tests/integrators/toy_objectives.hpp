@@ -364,7 +364,8 @@ public:
   void product(Positions const& x, Field const& p, Field const& hp) const {
     for_each<S>("chain_product", size(), ChainProduct<Data>{data_, x, p, hp});
   }
-  BlockCsr<S, double> pattern() const {
+  std::int64_t pattern_version(Positions const&) const { return 0; }
+  BlockCsr<S, double> pattern(Positions const&) const {
     BlockPattern pattern{{0}, {}};
     for (int i = 0; i < size(); ++i) {
       for (int j = std::max(i - 1, 0); j <= std::min(i + 1, size() - 1); ++j)

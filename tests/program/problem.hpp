@@ -120,10 +120,11 @@ struct ElasticProblem {
   /// Static equilibrium under forces per vertex (N).
   NewtonReport solve(VectorField<typename P::real, DefaultSpace> const& forces = {},
                      std::vector<std::string> const& options = tight_newton(1e-11)) {
-    ProgramPotential<P> potential(unknowns, Inertia<P>(unknowns), BodyForce<P>(unknowns), terms);
+    ProgramPotential<P> potential(unknowns, Inertia<P>(unknowns), BodyForce<P>(unknowns), terms,
+                                  {});
     potential.template term<BodyForce<P>>().set_forces(forces);
     potential.template term<Inertia<P>>().switch_on(false);
-    potential.begin_step(1, 1, false);
+    potential.begin_step(x, 1, 1, false);
     AnyMinimiser<P> newton(solver(options));
     return newton.minimise(potential, x, {});
   }

@@ -340,14 +340,14 @@ TEST_CASE("the assembled Hessian is the matrix-free one, and fixed rows are left
   Unknowns<Fp64, Right> const unknowns(mass, 0.1);
   for (std::size_t i = 0; i < body.x.size(); i += 5) unknowns.fixed(i) = 1;
   Potential potential(unknowns, Inertia(unknowns), Term(body.rest, two_materials[1]));
-  potential.begin_step(0.01, 0.1, true);
   auto const x = test::to_field(body.x, Term::Positions());
+  potential.begin_step(x, 0.01, 0.1, true);
   auto const p = test::to_field(body.p, Term::Vectors());
   for (std::size_t i = 0; i < body.x.size(); i += 5)
     for (int c = 0; c < 3; ++c) p(i, c) = 0;
   Term::Vectors const free("free", body.x.size()), assembled("assembled", body.x.size());
   potential.product(x, p, free);
-  auto const matrix = potential.pattern();
+  auto const matrix = potential.pattern(x);
   potential.assemble(x, matrix);
   product(matrix, p, assembled);
   double size = 0, worst = 0;
