@@ -145,13 +145,15 @@ inline void refuse_stray(kernels::Bounds const& bounds) {
 }
 
 /// Where the vertices are and how far they go: x to x + alpha p. Without motion `p` is empty. Pairs
-/// of vertices that are all `fixed` are of no interest; an empty mask fixes none.
+/// of vertices that are all `fixed` are of no interest, unless `between_fixed` asks for those whose
+/// marks differ, because these may move apart; an empty mask fixes none.
 template <class Precision, class S>
 struct Motion {
   VectorField<typename Precision::position, S> x;  ///< m
   VectorField<typename Precision::real, S> p = {};
   double alpha = 0;
   FixedMask<S> fixed = {};
+  bool between_fixed = false;
 
   KOKKOS_FUNCTION bool moves() const { return p.extent(0) > 0; }
   KOKKOS_FUNCTION Vec3<double> start(int v) const {

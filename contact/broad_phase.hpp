@@ -1,6 +1,6 @@
 // The search for pairs that may touch: all points and triangles, and all pairs of edges, that come
 // closer than a radius, as far as their boxes tell (boxes.hpp). Left out are pairs that share a
-// vertex and pairs all of whose vertices are fixed.
+// vertex and pairs all of whose vertices are fixed (or only those that are fixed as one).
 //
 // A `BroadPhase` is a policy that finds the boxes of a set that overlap a given one: SpatialHash,
 // Bvh, BruteForce. What is asked of it, in which order, and what becomes of the answers is the same
@@ -68,12 +68,21 @@ private:
 
 namespace kernels {
 
-/// Whether all four vertices are fixed; no vertex is under an empty mask.
+/// Which pairs are of no interest because all four vertices are fixed.
 template <class S>
-KOKKOS_INLINE_FUNCTION bool all_fixed(FixedMask<S> const& fixed, int const (&v)[4]) {
-  if (fixed.extent(0) == 0) return false;
-  return fixed(v[0]) != 0 && fixed(v[1]) != 0 && fixed(v[2]) != 0 && fixed(v[3]) != 0;
-}
+struct Held {
+  FixedMask<S> fixed;  ///< empty: none is
+  bool together;       ///< only those that are fixed by one mark
+
+  KOKKOS_INLINE_FUNCTION bool operator()(int const (&v)[4]) const {
+    if (fixed.extent(0) == 0) return false;
+    std::uint8_t const mark = fixed(v[0]);
+    for (int a = 0; a < 4; ++a) {
+      if (fixed(v[a]) == 0 || (together && fixed(v[a]) != mark)) return false;
+    }
+    return true;
+  }
+};
 
 /// Of what pairs are made. `vertices(i, j, v)` are those of the pair that box i of those that ask
 /// and box j of those that are asked for make; `accept(i, j)` says whether it is one.
@@ -81,7 +90,7 @@ template <class S>
 struct PairPointTriangle {
   static constexpr PairKind kind = PairKind::point_triangle;
   SurfaceViews<S> surface;
-  FixedMask<S> fixed;
+  Held<S> held;
 
   KOKKOS_FUNCTION SizeClass least(int) const { return smallest_class; }
   KOKKOS_FUNCTION void vertices(int i, int j, int (&v)[4]) const {
@@ -91,7 +100,7 @@ struct PairPointTriangle {
   KOKKOS_FUNCTION bool accept(int i, int j) const {
     int v[4];
     vertices(i, j, v);
-    return v[0] != v[1] && v[0] != v[2] && v[0] != v[3] && !all_fixed<S>(fixed, v);
+    return v[0] != v[1] && v[0] != v[2] && v[0] != v[3] && !held(v);
   }
 };
 
@@ -99,7 +108,7 @@ template <class S>
 struct PairEdgeEdge {
   static constexpr PairKind kind = PairKind::edge_edge;
   SurfaceViews<S> surface;
-  FixedMask<S> fixed;
+  Held<S> held;
   Kokkos::View<SearchBox const*, typename S::memory> box;
 
   KOKKOS_FUNCTION SizeClass least(int i) const { return size_class(longest_side(box(i))); }
@@ -116,7 +125,7 @@ struct PairEdgeEdge {
     int v[4];
     vertices(i, j, v);
     bool const shared = v[0] == v[2] || v[0] == v[3] || v[1] == v[2] || v[1] == v[3];
-    return !shared && !all_fixed<S>(fixed, v);
+    return !shared && !held(v);
   }
 };
 
@@ -215,10 +224,11 @@ public:
     triangles_.build(boxes_.triangles());
     edges_.build(boxes_.edges());
     SurfaceViews<Space> const& surface = boxes_.surface();
-    ask(boxes_.points(), triangles_.index(),
-        kernels::PairPointTriangle<Space>{surface, motion.fixed}, found.point_triangle);
+    kernels::Held<Space> const held{motion.fixed, motion.between_fixed};
+    ask(boxes_.points(), triangles_.index(), kernels::PairPointTriangle<Space>{surface, held},
+        found.point_triangle);
     ask(boxes_.edges(), edges_.index(),
-        kernels::PairEdgeEdge<Space>{surface, motion.fixed, boxes_.edges().box}, found.edge_edge);
+        kernels::PairEdgeEdge<Space>{surface, held, boxes_.edges().box}, found.edge_edge);
   }
 
   SurfaceViews<Space> const& surface() const { return boxes_.surface(); }

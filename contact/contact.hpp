@@ -73,8 +73,9 @@ public:
   };
 
   /// `rest`: where the vertices are at rest, m, one per unknown. Pairs whose vertices are all fixed
-  /// in `unknowns` are left alone. Copies share everything: they are one contact. Throws Error
-  /// where something does not fit or has no size.
+  /// in `unknowns` exert nothing, and are kept apart if they are fixed by different marks. Copies
+  /// share everything: they are one contact. Throws Error where something does not fit or has no
+  /// size.
   Contact(Unknowns<Precision, Space> const& unknowns, Surface const& surface,
           std::vector<Point> const& rest, Params const& params)
       : state_(std::make_shared<State>(unknowns, surface, rest, params)) {}
@@ -210,8 +211,7 @@ private:
 
     State(Unknowns<Precision, Space> const& unknowns, Surface const& host,
           std::vector<Point> const& rest, Params const& params)
-        : fixed(unknowns.fixed), bound(params.bound),
-          clearance(params.clearance) {
+        : fixed(unknowns.fixed), bound(params.bound), clearance(params.clearance) {
       if (rest.size() != host.object.size() || rest.size() != std::size_t(unknowns.size())) {
         throw Error(
             "contact: {} positions at rest, a surface over {} vertices and {} unknowns: give as "
@@ -271,7 +271,7 @@ private:
     /// The bound of a step of at most `length`, that is by `length` times `motion` metres.
     double bounded(Positions const& x, Vectors const& p, double length, double motion) {
       std::int64_t const searches = swept.counters().searches;
-      Touch const touch = swept.update({x, p, length, fixed});
+      Touch const touch = swept.update({x, p, length, fixed, true});
       if (swept.counters().searches > searches) swept_for = length * motion;
       if (touch == Touch::impossible) return length;
       double const first = bounded_by(swept.candidates().point_triangle, x, p, length);

@@ -38,6 +38,9 @@ int run_command(RunOptions const& options);
 /// intersections and objects inside others. 0 if there are none.
 int check_command(std::filesystem::path const& result, bool intersections = true);
 
+/// The summaries of results that `run` wrote, a row each, in Markdown. Throws Error.
+int table_command(std::vector<std::filesystem::path> const& results);
+
 int scenes_command();
 int methods_command();
 int plan_command(SceneArguments const& scene);

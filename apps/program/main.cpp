@@ -83,13 +83,14 @@ int main(int argc, char** argv) {
   run_app->add_flag("--force", run.force, "replaces a result that is there");
   run_app->add_flag("--restart", run.restart, "goes on from the checkpoint in --out");
   run_app
-      ->add_option("--check", run.check,
-                   "off, or every-step: ends at the first step that leaves an intersection (off)")
+      ->add_option(
+          "--check", run.check,
+          "off, or ends at the first step, or iteration, that leaves an intersection (off)")
       ->transform(CLI::CheckedTransformer(std::map<std::string, CheckRun>{
                                               {"off", CheckRun::off},
                                               {"every-step", CheckRun::every_step},
                                               {"every-iteration", CheckRun::every_iteration}})
-                      .description("{off,every-step}"));
+                      .description("{off,every-step,every-iteration}"));
   run_app->footer("example: taut run stretch_twist --frames 100 --method newton --out /tmp/twist");
   run_app->callback([&] { command = [&] { return run_command(run); }; });
 
@@ -110,6 +111,12 @@ int main(int argc, char** argv) {
                       "for bodies that may pass through each other: does not look for these");
   check_app->footer("example: taut check results/drag");
   check_app->callback([&] { command = [&] { return check_command(checked, !no_intersections); }; });
+
+  std::vector<std::filesystem::path> tabled;
+  auto* table_app = app.add_subcommand("table", "compares results, a row of Markdown each");
+  table_app->add_option("results", tabled, "folders that `taut run` wrote")->required();
+  table_app->footer("example: taut table results/*");
+  table_app->callback([&] { command = [&] { return table_command(tabled); }; });
 
   SceneArguments plan;
   auto* plan_app = app.add_subcommand("plan", "says what a scene is composed of, and why");

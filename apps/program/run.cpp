@@ -338,6 +338,7 @@ private:
         .set("largest_error_estimate_m", totals_.worst_error)
         .set("most_inverted_elements", static_cast<std::int64_t>(totals_.most_inverted))
         .set("steps_with_inverted_elements", static_cast<std::int64_t>(totals_.inverted_steps))
+        .set("intersections", std::string(check_ == CheckRun::off ? "not looked for" : "none"))
         .set("seconds", totals_.seconds)
         .set("frames_per_second", totals_.per_second())
         .set("warnings", geometry_.warnings);

@@ -9,6 +9,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 
 namespace taut {
 
@@ -219,16 +220,24 @@ private:
     }
   }
 
+  /// Each pin has a mark of its own, as long as there are any left: pins of one mark are not kept
+  /// apart. Marks depend on the order of the pins alone, be they held or not.
+  static std::uint8_t mark_after(std::uint8_t mark) {
+    return mark < std::numeric_limits<std::uint8_t>::max() ? mark + 1 : mark;
+  }
+
   /// Pins and forces of the step that ends at time t.
   void prescribe(double t, double h) {
     Kokkos::deep_copy(fixed_, std::uint8_t(0));
+    std::uint8_t mark = 0;
     for (Pin const& pin : geometry_.pins) {
+      mark = mark_after(mark);
       if (!pin.window.covers_step(t, h)) continue;
       RigidMap const map = pin.motion.at(t);
       for (std::int32_t v : pin.vertices) {
         int const i = order_.new_vertex[v];
         Point const to = map(geometry_.mesh.points[v]);
-        fixed_(i) = 1;
+        fixed_(i) = mark;
         for (int c = 0; c < 3; ++c) prescribed_(i, c) = static_cast<Position>(to[c]);
       }
     }

@@ -22,7 +22,8 @@
 
 namespace taut {
 
-/// Which unknowns are fixed: 1 at those. Terms leave their rows alone.
+/// Which unknowns are fixed: not 0 at those. Terms leave their rows alone. What moves as one rigid
+/// thing may have a mark of its own; unknowns of one mark never get in each other's way.
 template <class S>
 using FixedMask = Kokkos::View<std::uint8_t*, typename S::memory>;
 

@@ -12,7 +12,7 @@ struct Unknowns {
   using Positions = VectorField<typename Precision::position, Space>;
 
   Array<typename Precision::real, Space> mass;  ///< lumped, kg
-  FixedMask<Space> fixed;                       ///< 1 where prescribed
+  FixedMask<Space> fixed;                       ///< not 0 where prescribed (term.hpp)
   Positions prescribed;  ///< where fixed unknowns are to be at the end of the step, m
   double length = 1;     ///< length in which tolerances are measured, m (mean rest edge length)
 

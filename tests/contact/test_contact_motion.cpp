@@ -187,6 +187,37 @@ TEST_CASE("what is pinned pushes and does not cross", "[contact]") {
   }
 }
 
+TEST_CASE("what is pinned by different marks does not cross either", "[contact]") {
+  bool const one_mark = GENERATE(false, true);
+  CAPTURE(one_mark);
+  FallingBox const scene(2, 0.02, 0);
+  auto const mark = Kokkos::create_mirror_view(scene.body.unknowns.fixed);
+  for (std::size_t v = 0; v < scene.object.size(); ++v) {
+    mark(v) = one_mark ? 1 : static_cast<std::uint8_t>(1 + scene.object[v]);
+  }
+  Kokkos::deep_copy(scene.body.unknowns.fixed, mark);
+  Contact<> const contact(scene.body.unknowns, scene.surface, scene.body.rest.points, {});
+  Potential potential(scene.body.unknowns, Inertia(scene.body.unknowns), contact);
+  Falling stepper({.budget = {.max_iterations = 1000}});
+  State<> state(scene.body.positions());
+  scene.raise(0.1);
+  if (one_mark) {
+    CHECK(stepper.step(potential, state, 0.01).converged());
+    CHECK(furthest_of_pins(scene, state) == 0);
+    return;
+  }
+  try {
+    stepper.step(potential, state, 0.01);
+    FAIL("not held up");
+  } catch (HeldUp const& held) {
+    CHECK(held.by().unknowns.size() == 4);
+    int bodies = 0;
+    for (int v : held.by().unknowns) bodies |= 1 << scene.object[v];
+    CHECK(bodies == 3);
+  }
+  CHECK(to_points(state.x) == scene.body.rest.points);
+}
+
 TEST_CASE("one contact rests where K b' balances the load, whatever the time step", "[contact]") {
   // A weight at the corner of a triangle, whose other two corners are held, over a large one.
   std::vector<Point> const rest{{-3, 0, -2},   {0, 0, 4},       {3, 0, -2},
