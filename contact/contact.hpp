@@ -81,17 +81,17 @@ public:
       : state_(std::make_shared<State>(unknowns, surface, rest, params)) {}
 
   double value(Positions const& x, double scale) const {
-    if (!state_->complete({x, {}, 0, state_->fixed})) return 0;
+    if (!state_->complete(x)) return 0;
     using Kernel = kernels::PairValue<Pair, Precision, Space>;
     return scale * state_->table.sum("contact_value", Kernel{pairs(), x});
   }
   double change(Positions const& x, Vectors const& p, double alpha, double scale) const {
-    if (!state_->complete({x, p, alpha, state_->fixed})) return 0;
+    if (!state_->complete(x, p, alpha)) return 0;
     using Kernel = kernels::PairChange<Pair, Precision, Space>;
     return scale * state_->table.sum("contact_change", Kernel{pairs(), x, p, alpha});
   }
   double quadratic_form(Positions const& x, Vectors const& p, double scale) const {
-    if (!state_->complete({x, {}, 0, state_->fixed})) return 0;
+    if (!state_->complete(x)) return 0;
     using Kernel = kernels::PairForm<Pair, Precision, Space>;
     return scale * state_->table.sum("contact_form", Kernel{pairs(), x, p});
   }
@@ -122,7 +122,7 @@ public:
 
   void add_product(Positions const& x, Vectors const& p, double scale, Fixed const& fixed,
                    Vectors const& hp) const {
-    if (!state_->complete({x, {}, 0, state_->fixed})) return;
+    if (!state_->complete(x)) return;
     using Kernel = kernels::PairProduct<Pair, Precision, Space>;
     auto const slots = state_->table.slots(0);
     for_each<Space>("contact_product", pairs().count, Kernel{pairs(), x, p, fixed, slots});
@@ -132,7 +132,7 @@ public:
   /// Throws Error, before it writes anything, if the matrix was made when other pairs were
   /// candidates and lacks a block that is not zero: then its pattern must be made anew.
   void add_to(Matrix const& matrix, Positions const& x, double scale, Fixed const& fixed) const {
-    if (!state_->complete({x, {}, 0, state_->fixed})) return;
+    if (!state_->complete(x)) return;
     state_->table.check_pattern(matrix, x, fixed);
     state_->table.assemble(matrix, x, scale, fixed);
   }
@@ -167,7 +167,7 @@ public:
   void begin_step(StepStart<Precision, Space> const& start) const { state_->begin_step(start); }
   /// Grows with each search; x brings the candidates up to date.
   std::int64_t pattern_version(Positions const& x) const {
-    state_->complete({x, {}, 0, state_->fixed});
+    state_->complete(x);
     return state_->near.counters().searches;
   }
 
@@ -176,12 +176,13 @@ public:
   static double default_dhat(Surface const& surface, std::vector<Point> const& rest) {
     return 0.3 * edge_lengths(surface, rest).mean;
   }
-  /// Searches, and the calls that did without: for energies, and for bounds.
+  /// Searches, and the calls that did without: for energies and bounds of short motions, and for
+  /// bounds of long ones.
   CacheCounters const& energy_counters() const { return state_->near.counters(); }
   CacheCounters const& bound_counters() const { return state_->swept.counters(); }
   ContactReport report(Positions const& x) const {
     ContactReport r;
-    if (!state_->complete({x, {}, 0, state_->fixed})) return r;
+    if (!state_->complete(x)) return r;
     r.candidates = pairs().count;
     r.contacts = state_->table.contacts(x);
     r.smallest_gap = state_->table.smallest_gap(x);
@@ -200,8 +201,9 @@ private:
     static constexpr double growth = 4;  ///< of the portions of a motion
     double portion;                      ///< the first of them, m
     // Two, for those of a long motion are many: they would burden every evaluation after it.
-    Cache near;            ///< for energies
-    Cache swept;           ///< for bounds
+    Cache near;            ///< for energies, and for bounds of short motions
+    Cache swept;           ///< for bounds of others
+    double brief;          ///< motion up to which they are short, m
     double swept_for = 0;  ///< motion of its last search, m
     Table table;
     double limit = 0;
@@ -227,16 +229,17 @@ private:
       activation = {params.dhat.value_or(default_dhat(host, rest)), params.cap,
                     copy_points<Space>("contact_rest", rest), surface.object};
       near = Cache(surface, edges.mean, activation, params.search);
+      brief = 2 * params.search.slack * activation.dhat;
       swept = Cache(surface, edges.mean, activation, params.search);
       table = Table(surface, activation, params.stiffness, params.mollifier_threshold,
                     vertex_areas(host, rest), fixed);
       kernels::check_clearance(clearance, 1);
     }
 
-    /// Makes the table complete for a motion; false if nothing acts in it.
-    bool complete(Motion<Precision, Space> const& motion) {
-      if (near.update(motion) == Touch::impossible) return false;
-      table.take(near.candidates(), near.counters().searches);
+    /// Makes the table complete for a motion by alpha p; false if nothing acts in it.
+    bool complete(Positions const& x, Vectors const& p = {}, double alpha = 0) {
+      if (near.update({x, p, alpha, fixed, true}) == Touch::impossible) return false;
+      table.take(near);
       return table.pairs().count > 0;
     }
     void begin_step(StepStart<Precision, Space> const& start) {
@@ -270,18 +273,24 @@ private:
 
     /// The bound of a step of at most `length`, that is by `length` times `motion` metres.
     double bounded(Positions const& x, Vectors const& p, double length, double motion) {
+      // The candidates of a motion within the slack are no burden to energies.
+      if (length * motion <= brief) return bounded_within(near, x, p, length);
       std::int64_t const searches = swept.counters().searches;
-      Touch const touch = swept.update({x, p, length, fixed, true});
+      double const alpha = bounded_within(swept, x, p, length);
       if (swept.counters().searches > searches) swept_for = length * motion;
-      if (touch == Touch::impossible) return length;
-      double const first = bounded_by(swept.candidates().point_triangle, x, p, length);
-      return first > 0 ? bounded_by(swept.candidates().edge_edge, x, p, first) : first;
+      return alpha;
+    }
+    double bounded_within(Cache& cache, Positions const& x, Vectors const& p, double length) {
+      if (cache.update({x, p, length, fixed, true}) == Touch::impossible) return length;
+      double const first = bounded_by(cache, cache.candidates().point_triangle, x, p, length);
+      return first > 0 ? bounded_by(cache, cache.candidates().edge_edge, x, p, first) : first;
     }
     template <PairKind kind>
-    double bounded_by(CandidateList<kind, Space> const& list, Positions const& x, Vectors const& p,
-                      double length) {
+    double bounded_by(Cache const& cache, CandidateList<kind, Space> const& list,
+                      Positions const& x, Vectors const& p, double length) {
       BoundedStep const step = bound_step<Precision, Space, kind>(
-          bound, clearance, PairList<Space>(list.ids()), list.count(), x, p, length);
+          bound, clearance, PairList<Space>(list.ids()), list.count(), x, p, length,
+          cache.template distances<kind>());
       if (step.pair < 0) return length;
       limited = true;
       limit = step.alpha;
@@ -302,7 +311,7 @@ private:
   template <int numbers, class CurvatureField>
   void gradient(Positions const& x, double scale, Fixed const& fixed, Vectors const& g,
                 CurvatureField const& c) const {
-    if (!state_->complete({x, {}, 0, state_->fixed})) return;
+    if (!state_->complete(x)) return;
     using Kernel = kernels::PairGradient<Pair, Precision, Space, numbers>;
     auto const slots = state_->table.slots(numbers);
     for_each<Space>("contact_gradient", pairs().count, Kernel{{pairs(), x, {}, 0, slots}});
@@ -311,7 +320,7 @@ private:
   template <int numbers, class CurvatureField>
   double gradient_after(Positions const& x, Vectors const& p, double alpha, double scale,
                         Fixed const& fixed, Vectors const& g, CurvatureField const& c) const {
-    if (!state_->complete({x, p, -alpha, state_->fixed})) return 0;
+    if (!state_->complete(x, p, -alpha)) return 0;
     using Kernel = kernels::PairGradientAfter<Pair, Precision, Space, numbers>;
     auto const slots = state_->table.slots(numbers);
     double const change =

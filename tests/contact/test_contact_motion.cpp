@@ -73,7 +73,9 @@ struct FallingBox {
   void raise(double by) const {
     auto const to = Kokkos::create_mirror_view(body.unknowns.prescribed);
     for (std::size_t i = 0; i < object.size(); ++i)
-      for (int c = 0; c < 3; ++c) to(i, c) = body.rest.points[i][c] + (c == 1 ? by : 0);
+      for (int c = 0; c < 3; ++c) {
+        to(i, c) = body.rest.points[i][c] + (c == 1 && object[i] == 0 ? by : 0);
+      }
     Kokkos::deep_copy(body.unknowns.prescribed, to);
   }
 
