@@ -23,6 +23,9 @@ Point bench_position(Point const& X);
 /// A direction as smooth as those of a minimiser.
 Point bench_direction(Point const& X);
 
+/// Nonlinear CG by Dai and Kou with Jacobi and a check of sufficient decrease, for `iterations`.
+SolverOptions bench_pncg(int iterations);
+
 /// A field of the program's order and precision with `where` of each rest position.
 template <class T, class Where>
 VectorField<T, DefaultSpace> bench_field(BenchBody const& body, Where const& where) {

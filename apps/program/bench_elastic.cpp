@@ -36,9 +36,7 @@ Point bench_direction(Point const& X) {
   return {1e-3 * std::sin(7 * X[2]), 1e-3 * std::sin(6 * X[0]), 1e-3 * std::sin(5 * X[1])};
 }
 
-namespace {
-
-SolverOptions pncg(int iterations) {
+SolverOptions bench_pncg(int iterations) {
   SceneValue::Table keys;
   auto const set = [&](std::string const& key, auto value) {
     keys.push_back({key, SceneValue{"bench", std::move(value)}});
@@ -51,6 +49,8 @@ SolverOptions pncg(int iterations) {
   SceneValue const table{"bench", keys};
   return SolverOptions(Section(table, "solver"));
 }
+
+namespace {
 
 /// The rows of one model in one precision on one body.
 template <class P>
@@ -111,7 +111,7 @@ private:
     potential.begin_step(start, h * h, h, true);
     Kokkos::deep_copy(potential.template term<Inertia<P>>().target(), start);
     typename Unknowns<P>::Positions const x("x", start.extent(0));
-    AnyMinimiser<P> minimiser(pncg(iterations));
+    AnyMinimiser<P> minimiser(bench_pncg(iterations));
 
     double best = std::numeric_limits<double>::infinity();
     long allocations = 0;

@@ -13,16 +13,16 @@
 namespace taut {
 namespace {
 
-std::atomic<long> count = 0, held_now = 0, held_most = 0;
+std::atomic<long> count = 0, held_at_present = 0, held_most = 0;
 
 void allocated(Kokkos_Profiling_SpaceHandle, char const*, void const*, std::uint64_t bytes) {
   ++count;
-  held_now += static_cast<long>(bytes);
-  held_most = std::max(held_most.load(), held_now.load());
+  held_at_present += static_cast<long>(bytes);
+  held_most = std::max(held_most.load(), held_at_present.load());
 }
 
 void deallocated(Kokkos_Profiling_SpaceHandle, char const*, void const*, std::uint64_t bytes) {
-  held_now -= static_cast<long>(bytes);
+  held_at_present -= static_cast<long>(bytes);
 }
 
 double resident_bytes() {
@@ -38,7 +38,7 @@ double resident_bytes() {
 
 MemoryWatch::MemoryWatch() {
   malloc_trim(0);  // what is free already must not count as room
-  count = held_now = held_most = 0;
+  count = held_at_present = held_most = 0;
   resident_before_ = resident_bytes();
   Kokkos::Tools::Experimental::set_allocate_data_callback(allocated);
   Kokkos::Tools::Experimental::set_deallocate_data_callback(deallocated);
@@ -50,6 +50,7 @@ MemoryWatch::~MemoryWatch() {
 }
 
 double MemoryWatch::held() const { return double(held_most); }
+double MemoryWatch::held_now() const { return double(held_at_present); }
 double MemoryWatch::resident() const {
   malloc_trim(0);
   return resident_bytes() - resident_before_;

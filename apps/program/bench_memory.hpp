@@ -13,6 +13,7 @@ public:
   MemoryWatch& operator=(MemoryWatch const&) = delete;
 
   double held() const;  ///< bytes in arrays of Kokkos, at most so far, beyond those at the start
+  double held_now() const;  ///< the same at present
   double resident()
       const;  ///< bytes that the process has grown by; 0 where the system does not say
   static long allocations();  ///< arrays made so far, by anyone

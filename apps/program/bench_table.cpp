@@ -18,15 +18,6 @@ BenchRow const* find(Rows const& rows, BenchRow const& like, std::string_view ke
   return found == rows.end() ? nullptr : &*found;
 }
 
-std::string machine_table(std::vector<MachineRates> const& machines) {
-  std::string text = "machine        triad GB/s   fma fp32 GFLOP/s   fma fp64 GFLOP/s\n";
-  for (MachineRates const& m : machines) {
-    text += fmt::format("{:>2} thread{}   {:>12.1f} {:>18.1f} {:>18.1f}\n", m.threads,
-                        m.threads == 1 ? " " : "s", m.triad, m.fma32, m.fma64);
-  }
-  return text;
-}
-
 /// "12.3 (45%)"
 std::string cell(BenchRow const* row) {
   return row ? fmt::format("{:.2f} ({:.0f}%)", row->ns_per_tet, 100 * row->fraction) : "-";
@@ -102,6 +93,15 @@ std::string variants_table(Rows const& rows) {
 }
 
 }  // namespace
+
+std::string machine_table(std::vector<MachineRates> const& machines) {
+  std::string text = "machine        triad GB/s   fma fp32 GFLOP/s   fma fp64 GFLOP/s\n";
+  for (MachineRates const& m : machines) {
+    text += fmt::format("{:>2} thread{}   {:>12.1f} {:>18.1f} {:>18.1f}\n", m.threads,
+                        m.threads == 1 ? " " : "s", m.triad, m.fma32, m.fma64);
+  }
+  return text;
+}
 
 std::string bench_tables(Rows const& rows, std::vector<MachineRates> const& machines) {
   return machine_table(machines) + counts_table(rows) + elastic_table(rows) + variants_table(rows);

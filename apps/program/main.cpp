@@ -1,5 +1,6 @@
 // The program `taut`: maps the command line onto the commands.
 #include <taut/apps/program/bench.hpp>
+#include <taut/apps/program/bench_contact.hpp>
 #include <taut/apps/program/chart.hpp>
 #include <taut/apps/program/commands.hpp>
 #include <taut/apps/program/render.hpp>
@@ -176,6 +177,23 @@ int main(int argc, char** argv) {
   add_list(*elastic_app, "--threads", bench.threads, "numbers of threads (1 and all)")
       ->check(CLI::Range(1, 4096));
   elastic_app->callback([&] { command = [&] { return bench_command(bench); }; });
+
+  ContactBenchOptions contact_bench;
+  auto* contact_app =
+      bench_app->add_subcommand("contact", "search, sweeps and step bounds of contact");
+  add_list(*contact_app, "--precisions", contact_bench.precisions, "fp32, mixed, fp64");
+  add_list(*contact_app, "--contacts", contact_bench.contacts, "about so many pairs that act");
+  contact_app->add_option("--iterations", contact_bench.iterations, "of a step")
+      ->capture_default_str();
+  contact_app->add_option("--seconds", contact_bench.seconds, "spent on each number")
+      ->capture_default_str();
+  contact_app->add_flag("--json", contact_bench.json, "a JSON list of rows");
+  contact_app->add_flag("--quick", contact_bench.quick,
+                        "a small scene and haste, where --contacts and --seconds say nothing");
+  contact_app->footer("example: taut bench contact --contacts 100000 --threads 2");
+  add_list(*contact_app, "--threads", contact_bench.threads, "numbers of threads (1 and all)")
+      ->check(CLI::Range(1, 4096));
+  contact_app->callback([&] { command = [&] { return bench_contact_command(contact_bench); }; });
 
   for (CLI::App* sub : app.get_subcommands({})) {
     if (sub == bench_app) continue;

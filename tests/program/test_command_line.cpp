@@ -27,8 +27,8 @@ TEST_CASE("mistakes are answered by the nearest word, if any is near", "[cli]") 
 TEST_CASE("help has the program's name and an example everywhere", "[cli]") {
   says("--help", 0, "example: taut run");
   says("--version", 0, "taut 0.");
-  for (std::string const command :
-       {"run", "scenes", "methods", "check", "plan", "chart", "render", "bench", "bench elastic"}) {
+  for (std::string const command : {"run", "scenes", "methods", "check", "plan", "chart", "render",
+                                    "bench", "bench elastic", "bench contact"}) {
     says(command + " --help", 0, "Usage: taut " + command);
     says(command + " --help", 0, "example: taut " + command);
   }
