@@ -21,10 +21,12 @@ struct Activation {
   VectorField<double, S> rest;  ///< m
   typename SurfaceViews<S>::Indices object;
 
+  KOKKOS_FUNCTION bool one_body(int const (&v)[4]) const { return object(v[0]) == object(v[3]); }
+
   /// The distance below which the pair of vertices v acts, m. It is zero, so that the pair never
   /// acts, if the two touch at rest.
   KOKKOS_FUNCTION double operator()(PairKind kind, int const (&v)[4]) const {
-    if (object(v[0]) != object(v[3])) return dhat;
+    if (!one_body(v)) return dhat;
     Vec3<double> y[4];
     gather(v, rest, y);
     return Kokkos::min(dhat, fraction * closest_points(kind, y).distance);

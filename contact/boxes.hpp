@@ -43,9 +43,13 @@ KOKKOS_INLINE_FUNCTION SearchBox empty_box() {
 }
 
 KOKKOS_FORCEINLINE_FUNCTION bool overlap(SearchBox const& a, SearchBox const& b) {
-  bool all = true;
-  for (int c = 0; c < 3; ++c) all = all && a.low[c] <= b.high[c] && b.low[c] <= a.high[c];
-  return all;
+  // Without branches: which side is the first to fail is anyone's guess.
+  unsigned all = 1;
+  for (int c = 0; c < 3; ++c) {
+    all &=
+        static_cast<unsigned>(a.low[c] <= b.high[c]) & static_cast<unsigned>(b.low[c] <= a.high[c]);
+  }
+  return all != 0;
 }
 
 KOKKOS_FORCEINLINE_FUNCTION SearchBox join(SearchBox const& a, SearchBox const& b) {

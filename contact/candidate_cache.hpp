@@ -1,19 +1,27 @@
 // Keeps candidates over iterations and steps, as long as they can be proved complete.
 //
-// A search at x0 within the radius R finds every pair closer than R. If since then the vertices
-// have moved by u_i = x_i - x0_i, the distance of a pair has changed by max |u_i - u_j| at most,
-// which is no more than the diagonal m of the box around all u. So the list holds every pair that
-// is closer than r at x if r + m <= R, and R = r + 2 slack lasts until some vertex has moved by
-// more than the slack (m <= 2 max |u|), or longer: what all vertices do together does not count, a
-// scene in free fall is searched once.
+// Let a be the distance below which a pair acts, but half of dhat at least: what is left out may
+// not touch even where it never acts. A search at x0 finds every pair, and those stay of which
 //
-// The same bound says when nothing can touch: if a is the distance below which a pair acts, and c
-// the least d - a of all candidates at x0, no pair acts at x while m < min(c, R - r). Then the list
-// is complete, and not even its distances need be computed.
+//   d(x0) < a + reach.
+//
+// If since then the vertices have moved by u_i = x_i - x0_i, the distance of a pair has changed by
+// no more than the diagonal m of the box around their u (displacement.hpp), so the list holds every
+// pair that is closer than its a at x if m <= reach. Pairs of one body and pairs of two have an m
+// and a reach of their own: bodies that fly at each other make no candidates within themselves.
+// reach = 2 slack lasts until some vertex has moved by more than the slack, or longer: what all do
+// together does not count, a scene in free fall is searched once. Neighbours in one body, whose
+// boxes overlap for ever, are no candidates unless they come to act: a body far from all others has
+// none.
+//
+// The same bound says what cannot touch. A pair of the list does not act at x while m < d - a, with
+// d kept from the search: one number to read instead of four vertices. Where that holds for all,
+// the list need not be looked at.
 #pragma once
 
 #include <taut/contact/activation.hpp>
 #include <taut/contact/broad_phase.hpp>
+#include <taut/contact/displacement.hpp>
 
 namespace taut {
 
@@ -31,31 +39,6 @@ struct CacheCounters {
 
 namespace kernels {
 
-/// The displacements of the surface since the last search, at the start and the end of a motion,
-/// give or take the round-off of both: that of these sums, and that with which the end is stored.
-template <class Precision, class S>
-struct DisplacementCloud {
-  SurfaceViews<S> surface;
-  Motion<Precision, S> motion;
-  VectorField<double, S> origin;
-  KOKKOS_FUNCTION void add(int i, Bounds& bounds) const {
-    constexpr double epsilon_x = Kokkos::Experimental::epsilon_v<typename Precision::position>;
-    constexpr double epsilon = Kokkos::Experimental::epsilon_v<typename Precision::real>;
-    constexpr double epsilon_here = Kokkos::Experimental::epsilon_v<double>;
-    int const v = surface.vertex(i);
-    Vec3<double> const x0{origin(v, 0), origin(v, 1), origin(v, 2)};
-    Vec3<double> const x = motion.start(v), step = motion.step(v);
-    for (int c = 0; c < 3; ++c) {
-      double const here = 2 * epsilon_here * (Kokkos::abs(x[c]) + Kokkos::abs(x0[c]));
-      extend_axis(bounds, c, x[c] - x0[c], here, v);
-      if (!motion.moves()) continue;
-      double const size = Kokkos::abs(step[c]), end = x[c] + step[c];
-      double const stored = here + 2 * epsilon * size + epsilon_x * Kokkos::abs(end);
-      extend_axis(bounds, c, end - x0[c], stored, v);
-    }
-  }
-};
-
 template <class Precision, class S>
 struct KeepOrigin {
   SurfaceViews<S> surface;
@@ -67,26 +50,55 @@ struct KeepOrigin {
   }
 };
 
-/// Lowers to d - a of pair k.
+/// Keeps pairs that may act, or be half of dhat apart, once their distance has fallen by `reach`.
+template <class S>
+struct WithinReach {
+  Activation<S> activation;
+  Displacement reach;
+
+  KOKKOS_FUNCTION bool operator()(PairKind kind, int const (&v)[4],
+                                  Vec3<double> const (&y)[4]) const {
+    double const low = distance_below(kind, y);
+    double const far = activation.one_body(v) ? reach.within : reach.between;
+    if (!(low < activation.dhat + far)) return false;
+    return low < Kokkos::max(activation(kind, v), 0.5 * activation.dhat) + far;
+  }
+  /// The distance, less the round-off of computing it.
+  KOKKOS_FUNCTION static double distance_below(PairKind kind, Vec3<double> const (&y)[4]) {
+    double size = 0;
+    for (int a = 1; a < 4; ++a) size += norm(y[a] - y[0]);
+    // As for CloserThan.
+    constexpr double budget = 16 * Kokkos::Experimental::epsilon_v<double>;
+    return closest_points(kind, y).distance - budget * size;
+  }
+};
+
+/// Notes the distance of pair k, and lowers to what is left of it beyond activation, of pairs of
+/// one body or of two.
 template <PairKind kind, class S, class Positions>
 struct LeastClearance {
   PairIds<S> ids;
   Positions x;
   Activation<S> activation;
+  Array<float, S> distance;
+  bool one_body;
   KOKKOS_FUNCTION void operator()(int k, double& least) const {
     int v[4];
-    Vec3<double> y[4];
     read_pair(ids, k, v);
+    bool const one = activation.one_body(v);
+    if (one != one_body) return;
+    Vec3<double> y[4];
     gather(v, x, y);
-    double const distance = closest_points(kind, y).distance;
-    least = Kokkos::min(least, distance - activation(kind, v));
+    double const low = WithinReach<S>::distance_below(kind, y);
+    distance(k) = pair_length(one, FoundDistances<S>::shaded(low, y));
+    least = Kokkos::min(least, low - activation(kind, v));
   }
 };
 
 }  // namespace kernels
 
-/// Candidates that are found again when they have to be. `activation.dhat` is the radius r. The
-/// mask of fixed vertices is part of what was searched for: call `forget` where it changes.
+/// Candidates that are found again when they have to be. The mask of fixed vertices is part of what
+/// was searched for: call `forget` where it changes.
 template <BroadPhase Policy, class Precision = Mixed>
 class CandidateCache {
 public:
@@ -105,6 +117,7 @@ public:
       : search_(surface, edge_length, params.search),
         activation_(activation),
         slack_(params.slack * activation.dhat),
+        displacements_(surface),
         origin_("candidate_origin", surface.object.extent(0)) {
     if (!(activation.dhat > 0 && activation.fraction > 0 && activation.fraction < 1 &&
           params.slack >= 0)) {
@@ -116,70 +129,85 @@ public:
     }
   }
 
-  /// Makes `candidates()` hold every pair that comes closer than dhat during the motion, unless no
-  /// pair acts in it: then it may do less. Waits for the result. Throws Error where `find` does.
+  /// Makes `candidates()` hold every pair that during the motion comes closer than it acts, or than
+  /// half of dhat, unless no pair acts in it: then it may do less. Waits for the result. Throws
+  /// Error where `find` does.
   Touch update(Motion<Precision, Space> const& motion) {
-    double moved = found_within_ > 0 ? displacement(motion) : 0;
-    if (activation_.dhat + moved <= found_within_) {
+    if (complete_) {
+      moved_ = displacements_.measure(motion, origin_);
+      complete_ = moved_.within <= reach_.within && moved_.between <= reach_.between;
+    }
+    if (complete_) {
       ++counters_.reuses;
     } else {
       ++counters_.searches;
       search(motion);
-      moved = displacement(motion);
     }
-    if (!(moved < clear_for_)) return Touch::possible;
+    bool const clear = moved_.within < clear_for_.within && moved_.between < clear_for_.between;
+    if (!clear) return Touch::possible;
     ++counters_.skipped;
     return Touch::impossible;
   }
   /// Makes the next update search.
-  void forget() { found_within_ = 0; }
+  void forget() { complete_ = false; }
 
   Candidates<Space> const& candidates() const { return candidates_; }
+  /// How far apart the candidates of a kind were when they were found, and how far they may have
+  /// moved against each other by the end of the motion that was last asked for.
+  template <PairKind kind>
+  FoundDistances<Space> distances() const {
+    return {kind == PairKind::point_triangle ? triangle_distance_ : edge_distance_, moved_};
+  }
   CacheCounters const& counters() const { return counters_; }
 
 private:
-  /// A bound of how far any two vertices have moved against each other, m.
-  double displacement(Motion<Precision, Space> const& motion) const {
-    SurfaceViews<Space> const& surface = search_.surface();
-    if (surface.vertices() == 0) return 0;
-    using Cloud = kernels::DisplacementCloud<Precision, Space>;
-    kernels::Bounds const b = kernels::find_bounds<Space>("candidate_moved", surface.vertices(),
-                                                          Cloud{surface, motion, origin_});
-    refuse_stray(b);
-    return std::hypot(b.high[0] - b.low[0], b.high[1] - b.low[1], b.high[2] - b.low[2]);
-  }
-
   /// Around the start of the motion, far enough for its end.
   void search(Motion<Precision, Space> const& motion) {
     SurfaceViews<Space> const& surface = search_.surface();
-    found_within_ = 0;  // should it throw
     Motion<Precision, Space> at_start = motion;
     at_start.p = {};
     for_each<Space>("candidate_origin", surface.vertices(),
                     kernels::KeepOrigin<Precision, Space>{surface, motion.x, origin_});
-    double const within = activation_.dhat + displacement(motion) + 2 * slack_;
-    search_.find(at_start, within, candidates_);
-    double clear = within - activation_.dhat;
-    clear = clearance(candidates_.point_triangle, motion.x, clear);
-    clear_for_ = clearance(candidates_.edge_edge, motion.x, clear);
-    found_within_ = within;
+    moved_ = displacements_.measure(motion, origin_);
+    reach_ = {moved_.within + 2 * slack_, moved_.between + 2 * slack_};
+    double const farthest = displacements_.bodies() > 1 ? reach_.between : reach_.within;
+    search_.find(at_start, activation_.dhat + farthest, candidates_);
+    candidates_.keep(kernels::WithinReach<Space>{activation_, reach_}, motion.x);
+    clear_for_ = reach_;
+    clearance(candidates_.point_triangle, motion.x, triangle_distance_);
+    clearance(candidates_.edge_edge, motion.x, edge_distance_);
+    complete_ = true;
   }
 
+  /// Notes the distances of a list and lowers clear_for_.
   template <PairKind kind>
-  double clearance(CandidateList<kind, Space> const& list, Positions const& x,
-                   double ceiling) const {
+  void clearance(CandidateList<kind, Space> const& list, Positions const& x,
+                 Array<float, Space>& distance) {
+    if (distance.extent_int(0) < list.count()) {
+      distance = {};  // the old memory first
+      distance = Array<float, Space>(
+          Kokkos::view_alloc(Kokkos::WithoutInitializing, std::string("candidate_distance")),
+          static_cast<std::size_t>(list.count()) + list.count() / 2);
+    }
     using Least = kernels::LeastClearance<kind, Space, Positions>;
-    return minimum<Space>("candidate_clearance", list.count(), ceiling,
-                          Least{list.ids(), x, activation_});
+    for (bool one_body : {true, false}) {
+      double& clear = one_body ? clear_for_.within : clear_for_.between;
+      clear = minimum<Space>("candidate_clearance", list.count(), clear,
+                             Least{list.ids(), x, activation_, distance, one_body});
+    }
   }
 
   PairSearch<Policy> search_;
   Activation<Space> activation_;
   double slack_ = 0;
+  Displacements<Space> displacements_;
   VectorField<double, Space> origin_;
   Candidates<Space> candidates_;
-  double found_within_ = 0;  ///< R; 0: nothing has been found
-  double clear_for_ = 0;     ///< nothing acts until two vertices have moved this much
+  Array<float, Space> triangle_distance_, edge_distance_;
+  bool complete_ = false;  ///< for what has moved by reach_ at most
+  Displacement reach_;
+  Displacement clear_for_;  ///< nothing acts until so much has moved
+  Displacement moved_;      ///< in the motion that was last asked for
   CacheCounters counters_;
 };
 

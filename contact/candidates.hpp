@@ -7,6 +7,7 @@
 #pragma once
 
 #include <taut/contact/closest_features.hpp>
+#include <taut/contact/displacement.hpp>
 #include <taut/core/exec/scan.hpp>
 
 #include <limits>
@@ -29,6 +30,30 @@ KOKKOS_INLINE_FUNCTION void gather(int const (&v)[4], Positions const& x, Vec3<d
   for (int a = 0; a < 4; ++a)
     for (int c = 0; c < 3; ++c) y[a][c] = double(x(v[a], c));
 }
+
+/// How far apart the pairs of a list were where they were found, in m, each a little less than it
+/// was, and by how much their distances may have changed since, at any time of a motion. It tells
+/// that a pair is out of reach for the price of one number.
+template <class S>
+struct FoundDistances {
+  Array<float, S> at;  ///< pair_length; empty: nothing is known
+  Displacement moved;
+  static constexpr double shade = 1e-6;
+
+  KOKKOS_FUNCTION double least(int k) const { return Kokkos::abs(at(k)) - moved.of(at(k)); }
+  /// Where at(k) is not 0.
+  KOKKOS_FUNCTION double most(int k) const {
+    return Kokkos::abs(at(k)) * (1 + 4 * shade) + moved.of(at(k));
+  }
+
+  /// What to note for a pair at y whose distance was computed as `below` to at most 1e-14 of its
+  /// size: 0 where that may be more than a millionth.
+  KOKKOS_FUNCTION static float shaded(double below, Vec3<double> const (&y)[4]) {
+    double size = 0;
+    for (int a = 1; a < 4; ++a) size += norm(y[a] - y[0]);
+    return below > 1e-8 * size ? static_cast<float>((1 - shade) * below) : 0.f;
+  }
+};
 
 namespace kernels {
 

@@ -175,7 +175,8 @@ public:
   static double default_dhat(Surface const& surface, std::vector<Point> const& rest) {
     return 0.3 * edge_lengths(surface, rest).mean;
   }
-  /// Searches, and the calls that did without: for energies, and for bounds.
+  /// Searches, and the calls that did without: for energies and bounds of short motions, and for
+  /// bounds of long ones.
   CacheCounters const& energy_counters() const { return state_->near.counters(); }
   CacheCounters const& bound_counters() const { return state_->swept.counters(); }
   ContactReport report(Positions const& x) const {
@@ -199,8 +200,9 @@ private:
     static constexpr double growth = 4;  ///< of the portions of a motion
     double portion;                      ///< the first of them, m
     // Two, for those of a long motion are many: they would burden every evaluation after it.
-    Cache near;            ///< for energies
-    Cache swept;           ///< for bounds
+    Cache near;            ///< for energies, and for bounds of short motions
+    Cache swept;           ///< for bounds of others
+    double brief;          ///< motion up to which they are short, m
     double swept_for = 0;  ///< motion of its last search, m
     Table table;
     double limit = 0;
@@ -210,8 +212,7 @@ private:
 
     State(Unknowns<Precision, Space> const& unknowns, Surface const& host,
           std::vector<Point> const& rest, Params const& params)
-        : fixed(unknowns.fixed), bound(params.bound),
-          clearance(params.clearance) {
+        : fixed(unknowns.fixed), bound(params.bound), clearance(params.clearance) {
       if (rest.size() != host.object.size() || rest.size() != std::size_t(unknowns.size())) {
         throw Error(
             "contact: {} positions at rest, a surface over {} vertices and {} unknowns: give as "
@@ -227,6 +228,7 @@ private:
       activation = {params.dhat.value_or(default_dhat(host, rest)), params.cap,
                     copy_points<Space>("contact_rest", rest), surface.object};
       near = Cache(surface, edges.mean, activation, params.search);
+      brief = 2 * params.search.slack * activation.dhat;
       swept = Cache(surface, edges.mean, activation, params.search);
       table = Table(surface, activation, params.stiffness, params.mollifier_threshold,
                     vertex_areas(host, rest), fixed);
@@ -236,7 +238,7 @@ private:
     /// Makes the table complete for a motion; false if nothing acts in it.
     bool complete(Motion<Precision, Space> const& motion) {
       if (near.update(motion) == Touch::impossible) return false;
-      table.take(near.candidates(), near.counters().searches);
+      table.take(near);
       return table.pairs().count > 0;
     }
     void begin_step(StepStart<Precision, Space> const& start) {
@@ -270,18 +272,24 @@ private:
 
     /// The bound of a step of at most `length`, that is by `length` times `motion` metres.
     double bounded(Positions const& x, Vectors const& p, double length, double motion) {
+      // The candidates of a motion within the slack are no burden to energies.
+      if (length * motion <= brief) return bounded_within(near, x, p, length);
       std::int64_t const searches = swept.counters().searches;
-      Touch const touch = swept.update({x, p, length, fixed});
+      double const alpha = bounded_within(swept, x, p, length);
       if (swept.counters().searches > searches) swept_for = length * motion;
-      if (touch == Touch::impossible) return length;
-      double const first = bounded_by(swept.candidates().point_triangle, x, p, length);
-      return first > 0 ? bounded_by(swept.candidates().edge_edge, x, p, first) : first;
+      return alpha;
+    }
+    double bounded_within(Cache& cache, Positions const& x, Vectors const& p, double length) {
+      if (cache.update({x, p, length, fixed}) == Touch::impossible) return length;
+      double const first = bounded_by(cache, cache.candidates().point_triangle, x, p, length);
+      return first > 0 ? bounded_by(cache, cache.candidates().edge_edge, x, p, first) : first;
     }
     template <PairKind kind>
-    double bounded_by(CandidateList<kind, Space> const& list, Positions const& x, Vectors const& p,
-                      double length) {
+    double bounded_by(Cache const& cache, CandidateList<kind, Space> const& list,
+                      Positions const& x, Vectors const& p, double length) {
       BoundedStep const step = bound_step<Precision, Space, kind>(
-          bound, clearance, PairList<Space>(list.ids()), list.count(), x, p, length);
+          bound, clearance, PairList<Space>(list.ids()), list.count(), x, p, length,
+          cache.template distances<kind>());
       if (step.pair < 0) return length;
       limited = true;
       limit = step.alpha;

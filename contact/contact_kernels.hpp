@@ -21,7 +21,16 @@ struct PairTable {
   using Real = typename Precision::real;
   PairIds<S> vertex;
   Array<Real, S> stiffness, activation, mollifier;
+  Array<float, S> clearance;  ///< pair_length of the distance, where it was found, less activation
+  Displacement moved;         ///< since
   int point_triangles = 0, count = 0;
+
+  /// Pair k certainly does not act: neither where the vertices are, nor at the other end of the
+  /// motion, if there is one.
+  KOKKOS_FUNCTION bool idle(int k) const {
+    float const c = clearance(k);
+    return moved.of(c) < double(Kokkos::abs(c));
+  }
 
   KOKKOS_FUNCTION PairKind kind(int k) const {
     return k < point_triangles ? PairKind::point_triangle : PairKind::edge_edge;
@@ -63,6 +72,7 @@ struct TakeCandidates {
   PairKind kind;
   int first;
   PairIds<S> ids;
+  Array<float, S> distance;  ///< FoundDistances::at
   Activation<S> activation;
   Rule rule;
   StiffnessFields<Precision, S> fields;
@@ -79,6 +89,8 @@ struct TakeCandidates {
     gather(v, activation.rest, rest);
     for (int a = 0; a < 4; ++a) vertex_of_slot(4 * k + a) = v[a];
     pairs.activation(k) = static_cast<Real>(activation(kind, v));
+    float const left = Kokkos::abs(distance(i)) - static_cast<float>(pairs.activation(k));
+    pairs.clearance(k) = pair_length(distance(i) < 0, (1 - 1e-6f) * left);
     pairs.stiffness(k) = static_cast<Real>(rule(fields, kind, v));
     pairs.mollifier(k) = kind == PairKind::edge_edge
                              ? static_cast<Real>(Pair::Mollifier::scale(rest, mollifier_threshold))
@@ -94,7 +106,9 @@ struct PairValue {
     auto const s = pairs.template evaluate<Pair>(k, x);
     return s.at.distance < s.activation ? double(Pair::value(s)) : 0;
   }
-  KOKKOS_FUNCTION void operator()(int k, Sums<double, 1>& sum) const { sum[0] += value(k); }
+  KOKKOS_FUNCTION void operator()(int k, Sums<double, 1>& sum) const {
+    if (!pairs.idle(k)) sum[0] += value(k);
+  }
 };
 
 /// The change of energy by the step that has led to the state `after`; 0 if no pair within it acts.
@@ -129,7 +143,9 @@ struct PairChange {
     auto const parameters = pairs.parameters(k);
     return change_of_pair<Pair>(kind, parameters, Pair::evaluate(kind, parameters, y), step);
   }
-  KOKKOS_FUNCTION void operator()(int k, Sums<double, 1>& sum) const { sum[0] += change(k); }
+  KOKKOS_FUNCTION void operator()(int k, Sums<double, 1>& sum) const {
+    if (!pairs.idle(k)) sum[0] += change(k);
+  }
 };
 
 /// Slots: what each pair adds to the gradient and to `numbers` of the curvature of its vertices.
@@ -150,6 +166,12 @@ struct EvaluatePair {
   double alpha;
   ContactSlots<Precision, S> to;
 
+  /// A pair that is idle only leaves that it does not act.
+  KOKKOS_FUNCTION bool passed(int k) const {
+    bool const idle = pairs.idle(k);
+    if (idle) to.acts(k) = 0;
+    return idle;
+  }
   [[gnu::noinline]] KOKKOS_FUNCTION double evaluate(int k, bool after_step) const {
     auto const s = pairs.template evaluate<Pair>(k, x);
     bool const acts = s.at.distance < s.activation;
@@ -175,13 +197,15 @@ struct EvaluatePair {
 
 template <class Pair, class Precision, class S, int numbers>
 struct PairGradient : EvaluatePair<Pair, Precision, S, numbers> {
-  KOKKOS_FUNCTION void operator()(int k) const { this->evaluate(k, false); }
+  KOKKOS_FUNCTION void operator()(int k) const {
+    if (!this->passed(k)) this->evaluate(k, false);
+  }
 };
 /// And E(x) - E(x - alpha p).
 template <class Pair, class Precision, class S, int numbers>
 struct PairGradientAfter : EvaluatePair<Pair, Precision, S, numbers> {
   KOKKOS_FUNCTION void operator()(int k, Sums<double, 1>& sum) const {
-    sum[0] += this->evaluate(k, true);
+    if (!this->passed(k)) sum[0] += this->evaluate(k, true);
   }
 };
 
@@ -201,7 +225,9 @@ struct PairForm {
       for (int c = 0; c < 3; ++c) q[a][c] = static_cast<Real>(step[a][c]);
     return double(Pair::quadratic(s, q));
   }
-  KOKKOS_FUNCTION void operator()(int k, Sums<double, 1>& sum) const { sum[0] += form(k); }
+  KOKKOS_FUNCTION void operator()(int k, Sums<double, 1>& sum) const {
+    if (!pairs.idle(k)) sum[0] += form(k);
+  }
 };
 
 /// Block (a, b) of the projected Hessian of a pair; of the whole of it where that must be
@@ -254,7 +280,13 @@ struct PairProduct {
       for (int c = 0; c < 3; ++c) to.vector(4 * k + a, c) = sum[c];
     }
   }
-  KOKKOS_FUNCTION void operator()(int k) const { multiply(k); }
+  KOKKOS_FUNCTION void operator()(int k) const {
+    if (pairs.idle(k)) {
+      to.acts(k) = 0;
+    } else {
+      multiply(k);
+    }
+  }
 };
 
 /// Adds the slots of surface vertex i, and `numbers` of curvature, times `scale`.
@@ -303,7 +335,9 @@ struct AssembleRows {
   KOKKOS_FUNCTION void operator()(int i) const {
     int const v = vertex(i);
     if (fixed(v)) return;
-    for (int j = of.begin(v); j < of.begin(v + 1); ++j) add(v, of.slot(j));
+    for (int j = of.begin(v); j < of.begin(v + 1); ++j) {
+      if (!pairs.idle(of.slot(j) / 4)) add(v, of.slot(j));
+    }
   }
   [[gnu::noinline]] KOKKOS_FUNCTION void add(int v, int slot) const {
     int const k = slot / 4, a = slot % 4;
@@ -334,7 +368,9 @@ struct PairDistance {
       for (int c = 0; c < 3; ++c) local[a][c] = static_cast<Real>(y[a][c] - y[1][c]);
     return closest_points(pairs.kind(k), local).distance;
   }
-  KOKKOS_FUNCTION bool acts(int k) const { return distance(k) < pairs.activation(k); }
+  KOKKOS_FUNCTION bool acts(int k) const {
+    return !pairs.idle(k) && distance(k) < pairs.activation(k);
+  }
 };
 
 template <class Precision, class S>
@@ -349,7 +385,7 @@ template <class Precision, class S>
 struct LeastGap : PairDistance<Precision, S> {
   KOKKOS_FUNCTION void operator()(int k, double& least) const {
     double const a = double(this->pairs.activation(k));
-    if (a > 0) least = Kokkos::min(least, double(this->distance(k)) / a);
+    if (a > 0 && !this->pairs.idle(k)) least = Kokkos::min(least, double(this->distance(k)) / a);
   }
 };
 

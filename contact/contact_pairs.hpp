@@ -82,9 +82,15 @@ public:
     taken_ = 0;
   }
 
-  /// Takes over the candidates of search number `search`, unless it has already.
-  void take(Candidates<S> const& candidates, std::int64_t search) {
+  /// Takes over what a cache found, unless it has already, and how far that has moved since.
+  template <class Cache>
+  void take(Cache const& cache) {
+    auto const triangles = cache.template distances<PairKind::point_triangle>();
+    auto const edges = cache.template distances<PairKind::edge_edge>();
+    pairs_.moved = triangles.moved;
+    std::int64_t const search = cache.counters().searches;
     if (taken_ == search) return;
+    Candidates<S> const& candidates = cache.candidates();
     if (Rule::per_vertex && fields_.stiffness.extent(0) == 0) {
       throw Error(
           "contact: the stiffness rule '{}' needs to be told when a step begins: call begin_step "
@@ -101,8 +107,8 @@ public:
           count);
     }
     resize(static_cast<int>(count), candidates.point_triangle.count());
-    take_kind(0, candidates.point_triangle);
-    take_kind(pairs_.point_triangles, candidates.edge_edge);
+    take_kind(0, candidates.point_triangle, triangles);
+    take_kind(pairs_.point_triangles, candidates.edge_edge, edges);
     sort_.sort(4 * pairs_.count, vertex_of_slot_, static_cast<int>(fields_.area.extent(0)), begin_,
                slot_);
     taken_ = search;
@@ -176,11 +182,13 @@ private:
     if (pairs_.vertex.extent_int(0) >= count) return;
     std::size_t const n = std::size_t(count) + count / 2;
     pairs_.vertex = {}, pairs_.stiffness = {}, pairs_.activation = {}, pairs_.mollifier = {};
+    pairs_.clearance = {};
     slots_ = {}, slot_ = {}, vertex_of_slot_ = {}, sort_ = {};  // the old memory first
     pairs_.vertex = PairIds<S>(unset("contact_pairs"), n);
     pairs_.stiffness = Array<Real, S>(unset("contact_stiffness"), n);
     pairs_.activation = Array<Real, S>(unset("contact_activation"), n);
     pairs_.mollifier = Array<Real, S>(unset("contact_mollifier"), n);
+    pairs_.clearance = Array<float, S>(unset("contact_clearance"), n);
     slots_.acts = Flags(unset("contact_acts"), n);
     slots_.vector = Vectors(unset("contact_slots"), 4 * n);
     slot_ = Indices(unset("contact_slot"), 4 * n);
@@ -189,11 +197,12 @@ private:
     reducer_ = Reducer<S, double>(static_cast<int>(n), 1);
   }
   template <PairKind kind>
-  void take_kind(int first, CandidateList<kind, S> const& list) const {
+  void take_kind(int first, CandidateList<kind, S> const& list,
+                 FoundDistances<S> const& found) const {
     using Take = kernels::TakeCandidates<Pair, Rule, Precision, S>;
     for_each<S>("contact_take", list.count(),
-                Take{kind, first, list.ids(), activation_, rule_, fields_, mollifier_threshold_,
-                     pairs_, vertex_of_slot_});
+                Take{kind, first, list.ids(), found.at, activation_, rule_, fields_,
+                     mollifier_threshold_, pairs_, vertex_of_slot_});
   }
 
   using Indices = Kokkos::View<int*, typename S::memory>;

@@ -137,28 +137,36 @@ public:
       }
       return r;
     }
+    /// Row by row: cells along x are neighbours in memory, so a row is one run of boxes, or two
+    /// where its buckets go over the end of the table. It is shorter than the table, as there are
+    /// no more cells than boxes.
     template <class Visitor>
     KOKKOS_FUNCTION void visit_level(SearchBox const& query, int level, Visitor&& visitor) const {
       Range const r = range(query, level);
+      unsigned const cells = static_cast<unsigned>(r.high[0] - r.low[0] + 1);
       for (std::int64_t z = r.low[2]; z <= r.high[2]; ++z)
         for (std::int64_t y = r.low[1]; y <= r.high[1]; ++y) {
-          unsigned const row = grid.row(static_cast<int>(y), static_cast<int>(z), level);
-          for (std::int64_t x = r.low[0]; x <= r.high[0]; ++x) {
-            int const cell[3] = {static_cast<int>(x), static_cast<int>(y), static_cast<int>(z)};
-            visit_cell(query, level, cell, grid.bucket(row, cell[0]), visitor);
-          }
+          Row const row{level, static_cast<int>(y), static_cast<int>(z)};
+          unsigned const first =
+              grid.bucket(grid.row(row.y, row.z, level), static_cast<int>(r.low[0]));
+          unsigned const last = first + cells - 1;
+          visit_run(query, row, begin(first), begin(Kokkos::min(last, grid.mask) + 1), visitor);
+          if (last > grid.mask) visit_run(query, row, 0, begin((last & grid.mask) + 1), visitor);
         }
     }
+    struct Row {
+      int level, y, z;
+    };
+    /// Boxes that overlap are in cells of the row by what the grid promises of x.
     template <class Visitor>
-    KOKKOS_FUNCTION void visit_cell(SearchBox const& query, int level, int const (&cell)[3],
-                                    unsigned bucket, Visitor&& visitor) const {
-      int const end = begin(bucket + 1);
-      for (int k = begin(bucket); k < end; ++k) {
+    KOKKOS_FUNCTION void visit_run(SearchBox const& query, Row const& row, int first, int end,
+                                   Visitor&& visitor) const {
+      for (int k = first; k < end; ++k) {
         SearchBox const b = box(k);
-        if (!overlap(query, b) || grid.level(b) != level) continue;
-        bool here = true;
-        for (int c = 0; c < 3; ++c) here = here && grid.cell(b.low[c], level) == cell[c];
-        if (here) visitor(order(k));
+        if (overlap(query, b) && grid.cell(b.low[1], row.level) == row.y &&
+            grid.cell(b.low[2], row.level) == row.z && grid.level(b) == row.level) {
+          visitor(order(k));
+        }
       }
     }
   };

@@ -24,7 +24,8 @@ namespace taut {
 /// What settled how far a step may go.
 enum class Settled : int {
   at_rest,    ///< nothing moves: all of it
-  boxes,      ///< all of it, for the motion is shorter than what boxes leave to use
+  boxes,      ///< all of it, for the motion is shorter than what boxes leave to use, or than what
+              ///< the distance where the pair was found leaves
   direction,  ///< all of it, by the shadows along the direction of the closest points
   advance,    ///< all of it, in several intervals
   cut,        ///< less than asked for
@@ -41,10 +42,12 @@ struct Reach {
 };
 
 /// A policy, on a path P. `certify` is the cheap part of `bound`: what it leaves open, `bound` may
-/// decide, and at a higher price in a wider scalar.
+/// decide, and at a higher price in a wider scalar. `by_gap`: it lets a pair go all the way if that
+/// cannot use up more of the gap than the clearance allows.
 template <class B, class P>
 concept GapBound = GapPath<P> &&
     requires(B const& b, P const& path, Clearance const& clearance, typename P::Scalar at_most) {
+  { B::by_gap } -> std::convertible_to<bool>;
   { b.certify(path, clearance, at_most) } -> std::same_as<Reach<typename P::Scalar>>;
   { b.bound(path, clearance, at_most) } -> std::same_as<Reach<typename P::Scalar>>;
 };
@@ -74,6 +77,7 @@ KOKKOS_INLINE_FUNCTION Reach<T> settle(T alpha, T kept, T at_most, Settled whole
 }  // namespace kernels
 
 struct AdditiveCcd {
+  static constexpr bool by_gap = true;
   int iterations = 64;           ///< at most; what they have certified counts
   double tolerance = 1.0 / 256;  ///< ends where an iteration adds less than this share of alpha
 
@@ -112,6 +116,8 @@ struct AdditiveCcd {
 };
 
 struct PairwiseClosing {
+  static constexpr bool by_gap = true;
+
   template <GapPath Path, class T = typename Path::Scalar>
   KOKKOS_INLINE_FUNCTION Reach<T> certify(Path const& path, Clearance const& clearance,
                                           T at_most) const {
@@ -144,6 +150,7 @@ struct PairwiseClosing {
 
 /// Not a guarantee (see above). `kept` is 0.
 struct HalfDhatClamp {
+  static constexpr bool by_gap = false;
   double dhat = 0;  ///< distance at which contact begins to act, m
 
   template <GapPath Path, class T = typename Path::Scalar>

@@ -78,6 +78,19 @@ struct BoundPairs : BoundReduction {
   PairList<S> pairs;
   VectorField<typename Precision::position, S> x;
   VectorField<Real, S> p;
+  FoundDistances<S> found;
+
+  /// Whether pair k keeps its clearance whatever its vertices do: it was far enough apart where it
+  /// was found.
+  KOKKOS_FUNCTION bool out_of_reach(int k) const {
+    if constexpr (Bound::by_gap) {
+      if (found.at.extent(0) == 0) return false;
+      double const most = found.most(k);
+      return found.least(k) > most - clearance.usable(most);
+    } else {
+      return false;
+    }
+  }
 
   /// Compiled once: inlined into several loops, it could be contracted to other fused products in
   /// each, and a bound would depend on whether its loop runs in parallel.
@@ -96,6 +109,10 @@ struct BoundPairs : BoundReduction {
   }
 
   KOKKOS_FUNCTION void operator()(int k, BoundedStep& step) const {
+    if (out_of_reach(k)) {
+      ++step.settled[static_cast<int>(Settled::boxes)];
+      return;
+    }
     auto const r = reach(k);
     add(step, k, r.alpha, r.settled);
   }
@@ -142,6 +159,10 @@ struct StayWithin {
   double allowed, at_most;
 
   KOKKOS_FUNCTION void operator()(int i, double& smallest) const {
+    smallest = Kokkos::min(smallest, reach(i));
+  }
+  /// Compiled once, as in BoundPairs.
+  [[gnu::noinline]] KOKKOS_FUNCTION double reach(int i) const {
     constexpr double unit = Kokkos::Experimental::epsilon_v<typename Precision::position> / 2;
     Vec3<double> moved, step;
     double far = 0, along = 0;
@@ -153,9 +174,9 @@ struct StayWithin {
     }
     constexpr double more = 1 + budget<double>, less = 1 - budget<double>;
     double const speed = more * norm(step) + 4 * unit * along;
-    if (speed == 0) return;
+    if (speed == 0) return at_most;
     double const room = less * allowed - more * (norm(moved) + unit * far);
-    smallest = Kokkos::min(smallest, share_of(room, speed, at_most));
+    return share_of(room, speed, at_most);
   }
 };
 
@@ -192,16 +213,18 @@ BoundedStep bound_each(char const* name, int n, Functor const& functor) {
 /// The largest alpha in (0, at_most] that `bound` certifies for the first n pairs of a list, from
 /// the positions x (m) along p (m): 0 where a pair is `uncertain`, which is for the caller to
 /// report. Rounding alpha to Precision::position is allowed for. Pairs that Precision::real does
-/// not settle by certificates are decided in fp64. Waits for the result. Throws Error if the
-/// clearance or at_most makes no sense.
+/// not settle by certificates are decided in fp64. `found`, where it is known for this step (as the
+/// cache knows it), settles what is out of reach without a look. Waits for the result. Throws Error
+/// if the clearance or at_most makes no sense.
 template <class Precision, class S, PairKind kind, class Bound>
 BoundedStep bound_step(Bound const& bound, Clearance const& clearance, PairList<S> const& pairs,
                        int n, VectorField<typename Precision::position, S> const& x,
-                       VectorField<typename Precision::real, S> const& p, double at_most) {
+                       VectorField<typename Precision::real, S> const& p, double at_most,
+                       FoundDistances<S> const& found = {}) {
   kernels::check_clearance(clearance, at_most);
-  return kernels::bound_each<S>(
-      "contact_step_bound", n,
-      kernels::BoundPairs<Precision, S, kind, Bound>{{at_most}, bound, clearance, pairs, x, p});
+  return kernels::bound_each<S>("contact_step_bound", n,
+                                kernels::BoundPairs<Precision, S, kind, Bound>{
+                                    {at_most}, bound, clearance, pairs, x, p, found});
 }
 
 /// The same for each vertex by itself: lowers alpha(v) of the vertices of each pair. Returns the

@@ -105,6 +105,24 @@ std::vector<std::pair<Pair, double>> all_activations(TwoBalls const& balls, doub
   return all;
 }
 
+/// Pairs of a list whose distance, at one of two places, is not between what the cache says.
+template <class Cache, PairKind kind>
+int strays(Cache const& cache, CandidateList<kind, S> const& list, std::vector<Point> const& x,
+           std::vector<Point> const& end) {
+  FoundDistances<S> const found = cache.template distances<kind>();
+  auto const at = Kokkos::create_mirror_view_and_copy(Kokkos::HostSpace(), found.at);
+  FoundDistances<Space<Kokkos::DefaultHostExecutionSpace>> const known{at, found.moved};
+  std::vector<std::array<int, 4>> const pairs = to_host(list);
+  int count = 0;
+  for (std::size_t k = 0; k < pairs.size(); ++k) {
+    for (auto const* where : {&x, &end}) {
+      double const d = distance(Pair{kind, pairs[k]}, *where);
+      count += !(known.least(int(k)) <= d && d <= known.most(int(k)));
+    }
+  }
+  return count;
+}
+
 }  // namespace
 
 TEST_CASE("a list grows, and allocates only then", "[contact]") {
@@ -257,7 +275,7 @@ TEMPLATE_TEST_CASE("a cache misses no pair over random walks", "[contact]", Spat
     std::vector<Point> x = balls.x;
     Random random(seed);
     int acting_steps = 0, impossible_steps = 0;
-    std::size_t missed = 0, wrong = 0;
+    std::size_t missed = 0, wrong = 0, unknown = 0, remembered = 0;
     for (int step = 0; step < 40; ++step) {
       // Both fall, sway towards each other and tremble.
       for (std::size_t v = 0; v < x.size(); ++v) {
@@ -283,9 +301,12 @@ TEMPLATE_TEST_CASE("a cache misses no pair over random walks", "[contact]", Spat
       for (auto const& [pair, a] : activations) {
         double const d =
             motion.moves() ? std::min(distance(pair, x), distance(pair, end)) : distance(pair, x);
-        if (d < dhat && !found.has(pair)) ++missed;
+        if (d < std::max(a, 0.5 * dhat) && !found.has(pair)) ++missed;
         acts = acts || d < a;
       }
+      unknown += strays(cache, cache.candidates().point_triangle, x, end);
+      unknown += strays(cache, cache.candidates().edge_edge, x, end);
+      remembered += cache.candidates().point_triangle.count();
       wrong += acts && touch == Touch::impossible;
       acting_steps += acts;
       impossible_steps += touch == Touch::impossible;
@@ -293,6 +314,8 @@ TEMPLATE_TEST_CASE("a cache misses no pair over random walks", "[contact]", Spat
     INFO("seed " << seed);
     CHECK(missed == 0);
     CHECK(wrong == 0);
+    CHECK(unknown == 0);
+    CHECK(remembered > 100);
     CHECK(acting_steps > 5);
     CHECK(impossible_steps > 2);
     CacheCounters const& counters = cache.counters();
@@ -351,6 +374,26 @@ TEST_CASE("a cache searches when the bound asks for it, and not before", "[conta
   x[v] = before;
   cache.update(at(x));
   CHECK(cache.counters().searches == 6);
+}
+
+TEST_CASE("neighbours in one body are no candidates until they come to act", "[contact]") {
+  TwoBalls const balls(10);  // far apart
+  double const dhat = 0.3 * balls.edge_length;
+  CandidateCache<SpatialHash<S>, Fp64> cache(copy_surface<S>(balls.surface), balls.edge_length,
+                                             balls.activation(dhat));
+  CHECK(cache.update(at(balls.x)) == Touch::impossible);
+  PairSearch<SpatialHash<S>> search(copy_surface<S>(balls.surface), balls.edge_length);
+  Candidates<S> boxes;
+  search.find(at(balls.x), 1.5 * dhat, boxes);
+  CHECK(boxes.edge_edge.count() > 500);  // whose boxes overlap for ever
+  CHECK(cache.candidates().point_triangle.count() == 0);
+  CHECK(cache.candidates().edge_edge.count() < boxes.edge_edge.count() / 20);
+
+  // Squashed flat, what was opposite acts.
+  std::vector<Point> x = balls.x;
+  for (Point& v : x) v[1] *= 0.01;
+  CHECK(cache.update(at(x)) == Touch::possible);
+  CHECK(cache.candidates().point_triangle.count() > 50);
 }
 
 TEST_CASE("a cache refuses distances that make no sense", "[contact]") {

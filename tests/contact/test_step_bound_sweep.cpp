@@ -171,6 +171,57 @@ TEMPLATE_LIST_TEST_CASE("the step of a sweep keeps every pair apart where it is 
   check(std::integral_constant<PairKind, PairKind::edge_edge>{});
 }
 
+TEMPLATE_LIST_TEST_CASE("what was found far enough apart keeps its clearance without a look",
+                        "[step_bound]", Settings) {
+  using S = typename TestType::S;
+  using Position = typename TestType::Precision::position;
+  auto const check = [](auto kind, auto const& bound, bool by_gap) {
+    constexpr PairKind k = decltype(kind)::value;
+    int passed = 0, looked_at = 0;
+    for (unsigned seed = 0; seed < 4; ++seed) {
+      for (PairMotion m : crowd<TestType>(k, 60, seed).motion) {
+        double const distance = true_distance(m, 0);
+        // The corners move against each other by half of the gap, or of what is left of it.
+        double fastest = 0;
+        for (int a = 0; a < 4; ++a)
+          for (int b = 0; b < 4; ++b) fastest = std::max(fastest, norm(m.p[a] - m.p[b]));
+        if (!(fastest > 0)) continue;
+        double const by = (seed % 2 == 0 ? 0.4 : 0.9) * distance;
+        for (auto& p : m.p)
+          for (int c = 0; c < 3; ++c) {
+            p[c] = stored<typename TestType::Precision::real>(by / fastest * p[c]);
+          }
+        Crowd<TestType> const c({m});
+        Vec3<double> y[4] = {m.x[0], m.x[1], m.x[2], m.x[3]};
+        FoundDistances<S> found{Array<float, S>("found", 1), {}};
+        found.at(0) = FoundDistances<S>::shaded(distance * (1 - 1e-9), y);
+        // That of the corners and of storing them.
+        double const moved =
+            by * (1 + 1e-6) + 8 * double(std::numeric_limits<Position>::epsilon()) * m.size();
+        found.moved = {seed % 4 < 2 ? moved : 0, seed % 4 < 2 ? 0 : moved};
+        found.at(0) = pair_length(seed % 4 < 2, found.at(0));
+        CHECK((found.at(0) == 0 || (found.least(0) <= distance - by && found.most(0) >= distance)));
+        Clearance const clearance{.share = 0.9};
+        auto const plain = sweep<TestType, k>(c, bound, clearance, 1.0);
+        auto const step = bound_step<typename TestType::Precision, S, k>(bound, clearance, c.pairs,
+                                                                         1, c.x, c.p, 1.0, found);
+        bool const pass = step.alpha == 1 && step.count(Settled::boxes) == 1;
+        if (!pass) CHECK(same(step, plain));
+        if (pass && by_gap) CHECK(proved_apart(m, 0.1 * distance - 1e-13 * m.size(), 0, 1));
+        (pass ? passed : looked_at) += 1;
+      }
+    }
+    CHECK(looked_at > 50);
+    CHECK((passed > 50) == by_gap);
+  };
+  using Triangle = std::integral_constant<PairKind, PairKind::point_triangle>;
+  using Edge = std::integral_constant<PairKind, PairKind::edge_edge>;
+  check(Triangle{}, AdditiveCcd{}, true);
+  check(Edge{}, AdditiveCcd{}, true);
+  check(Edge{}, PairwiseClosing{}, true);
+  check(Triangle{}, HalfDhatClamp{0.1}, false);  // it does not look at gaps, so it may not skip
+}
+
 TEST_CASE("fp32 kernels leave to fp64 what is too near for them", "[step_bound]") {
   // 1e-9 apart at size 1, in mixed precision: the positions tell, fp32 differences do not.
   PairMotion const m{PairKind::point_triangle,
