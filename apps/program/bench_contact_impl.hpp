@@ -180,7 +180,7 @@ private:
     add(rows, "max_step", bound_seconds);
     auto const anew = [&](auto const& what) {
       return time([&] {
-        contact.begin_step({x_, 1, {}});  // forgets what has been found
+        contact.begin_step({x_, h, {}});
         what();
       });
     };
@@ -236,10 +236,10 @@ private:
           terms.quadratic_form(x_, p_, h2);
         }));
 
-    AnySteppedTerms<P, DefaultSpace> told;
-    told.add(contact);
+    AnySteppedTerms<P, S> contacts;
+    contacts.add(contact);
     ProgramPotential<P> potential(unknowns_, Inertia<P>(unknowns_),
-                                  BodyForce<P>(unknowns_, {0, -9.81, 0}), terms, told);
+                                  BodyForce<P>(unknowns_, {0, -9.81, 0}), terms, contacts);
     potential.begin_step(x_, h2, h, true);
     // Thrown at each other by twice dhat in this step.
     std::vector<Point> target = scene_.rest.points;
@@ -251,7 +251,7 @@ private:
     AnyMinimiser<P> minimiser(bench_pncg(options_.iterations));
     int taken = 0;
     auto const run = [&] {
-      contact.begin_step({x_, 1, {}});  // forgets what has been found
+      contact.begin_step({x_, h, {}});
       Kokkos::deep_copy(x, x_);
       taken = minimiser.minimise(potential, x, {}).iterations;
       if (taken < 2) throw Error("bench: the step with contact stops after {} iterations", taken);
