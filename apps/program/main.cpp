@@ -23,16 +23,6 @@ namespace {
 
 using namespace taut;
 
-void add_scene(CLI::App& command, SceneArguments& arguments) {
-  command.add_option("scene", arguments.scene, "a built-in scene (`taut scenes`) or a TOML file")
-      ->capture_default_str();
-  command
-      .add_option("--set", arguments.changes.overrides,
-                  "changes a key of the scene: --set solver.tolerance=1e-4; may be repeated")
-      ->allow_extra_args(false);
-  command.add_flag("--small", arguments.changes.small, "the small version of the scene");
-}
-
 /// A shorthand for --set KEY=VALUE.
 void add_shorthand(CLI::App& command, SceneArguments& arguments, std::string const& option,
                    std::string const& key, std::string const& help) {
@@ -42,6 +32,18 @@ void add_shorthand(CLI::App& command, SceneArguments& arguments, std::string con
         arguments.changes.overrides.push_back(key + "=" + value);
       },
       help + " (" + key + ")");
+}
+
+void add_scene(CLI::App& command, SceneArguments& arguments) {
+  command.add_option("scene", arguments.scene, "a built-in scene (`taut scenes`) or a TOML file")
+      ->capture_default_str();
+  command
+      .add_option("--set", arguments.changes.overrides,
+                  "changes a key of the scene: --set solver.tolerance=1e-4; may be repeated")
+      ->allow_extra_args(false);
+  command.add_flag("--small", arguments.changes.small, "the small version of the scene");
+  add_shorthand(command, arguments, "--resolution", "resolution",
+                "factor of the resolution of every shape");
 }
 
 /// A list with commas; a word after it is the next argument of the command.

@@ -71,6 +71,21 @@ struct SizeOfShape {
     double const across = 2 * torus.tube_radius;
     return block({across, across, 2 * std::numbers::pi * torus.radius}, across / resolution);
   }
+  MeshSize operator()(BowlShape const& bowl) const {
+    double const across = 2 * bowl.radius * std::acos(1 - bowl.height / bowl.radius);
+    return block({across, bowl.thickness, across}, across / resolution);
+  }
+  MeshSize operator()(FunnelShape const& funnel) const {
+    double const along = funnel.spout + std::hypot(funnel.radius - funnel.throat, funnel.height);
+    double const around = std::numbers::pi * (funnel.radius + funnel.throat);
+    return block({funnel.thickness, along, around}, along / resolution);
+  }
+  MeshSize operator()(TetsShape const& tets) const {
+    double const n = resolution, given = static_cast<double>(tets.mesh.tets.size());
+    // A vertex to six tets, and half a one more for each on the surface, where all given ones are.
+    double const faces = 2 * static_cast<double>(tets.mesh.points.size()) - 4;
+    return {given * n * n * n / 6 + faces * n * n / 4, given * n * n * n};
+  }
 };
 
 /// The number that a file begins with, after comments; 0 if it begins with something else.
@@ -147,17 +162,20 @@ double groups_leave(fs::path const& root) {
 
 MeshSize estimate_size(Scene const& scene) {
   MeshSize sum;
+  auto const add = [&](MeshSize const& one) {
+    sum = {sum.vertices + one.vertices, sum.tets + one.tets};
+  };
+  auto const size_of_shape = [](ProceduralShape const& geometry) {
+    return std::visit(SizeOfShape{geometry.resolution}, geometry.shape);
+  };
   for (SceneObject const& object : scene.objects) {
     auto const* file = std::get_if<fs::path>(&object.geometry);
-    MeshSize one;
-    if (file) {
-      one = size_of_file(*file);
-    } else {
-      auto const& [shape, resolution] = std::get<ProceduralShape>(object.geometry);
-      one = std::visit(SizeOfShape{resolution}, shape);
-    }
-    sum = {sum.vertices + one.vertices, sum.tets + one.tets};
+    add(file ? size_of_file(*file) : size_of_shape(std::get<ProceduralShape>(object.geometry)));
   }
+  // The surface of an obstacle is cut from a mesh of all of it.
+  for (SceneObstacle const& obstacle : scene.obstacles)
+    if (auto const* shape = std::get_if<ProceduralShape>(&obstacle.geometry))
+      add(size_of_shape(*shape));
   return sum;
 }
 

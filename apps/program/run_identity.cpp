@@ -72,6 +72,10 @@ std::string run_identity(SceneChanges const& changes, Scene const& scene,
     add(hash, force.vertices);
     add(hash, force.force);
   }
+  for (ObstacleSurface const& surface : geometry.obstacle_meshes) {
+    add(hash, surface.mesh.points);
+    add(hash, surface.mesh.triangles);
+  }
   return text + fmt::format("\nevery = {}\nmeshes {:016x}\n", scene.output.every, hash.value());
 }
 

@@ -66,6 +66,7 @@ struct ProceduralShape {
 struct SceneObject {
   std::string where;
   std::string name;
+  std::string copy_of;  ///< its name in the file, by which pins and forces call all its copies
   std::variant<ProceduralShape, std::filesystem::path> geometry;
   double scale = 1;    ///< the mesh is scaled, then rotated about the origin, then translated
   RigidMap placement;  ///< rotation and translation
@@ -73,6 +74,42 @@ struct SceneObject {
   MaterialParameters material;
   std::vector<SceneRegion> regions;  ///< later ones win
   Start start;
+};
+
+/// What bodies touch, in a frame of its own: half of space, or a convex region that keeps them in.
+struct HalfSpace {
+  Point point{};          ///< m, on its plane
+  Point normal{0, 1, 0};  ///< unit vector, to where bodies are
+};
+struct InsideBox {
+  Point size;  ///< m, centred on the origin
+};
+struct InsideSphere {
+  double radius;  ///< m, centred on the origin
+};
+struct InsideCylinder {
+  double radius;  ///< m
+  double height;  ///< m, along y, centred on the origin
+};
+
+/// What bodies touch and what is not simulated. The outside of a shape is a surface of triangles:
+/// that of a procedural tet mesh, or an OBJ file.
+struct SceneObstacle {
+  std::string where;
+  std::string name;
+  std::variant<HalfSpace, InsideBox, InsideSphere, InsideCylinder, ProceduralShape,
+               std::filesystem::path>
+      geometry;                    ///< analytic ones are scaled already
+  double scale = 1;                ///< of surfaces, before `placement`
+  RigidMap placement;              ///< at time 0
+  RigidMotion motion;              ///< from there
+  std::optional<double> friction;  ///< coefficient between it and bodies; the scene's if not given
+
+  /// Whether it is a surface of triangles.
+  bool is_surface() const {
+    return std::holds_alternative<ProceduralShape>(geometry) ||
+           std::holds_alternative<std::filesystem::path>(geometry);
+  }
 };
 
 /// Prescribed vertices. They follow `motion` from their rest position until the time of release.
@@ -116,10 +153,12 @@ struct Scene {
   std::string name;
   std::string description;
   TimeScheme scheme = TimeScheme::implicit_euler;
-  double step = 0;  ///< s
-  int frames = 0;   ///< time steps
-  Point gravity{};  ///< m/s^2
+  double step = 0;        ///< s
+  int frames = 0;         ///< time steps
+  Point gravity{};        ///< m/s^2
+  double resolution = 1;  ///< factor of the resolution of every shape, which holds it already
   std::vector<SceneObject> objects;
+  std::vector<SceneObstacle> obstacles;
   std::vector<ScenePin> pins;
   std::vector<SceneForce> forces;
   SolverOptions solver;

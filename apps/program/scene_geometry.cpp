@@ -1,4 +1,5 @@
 #include <taut/apps/program/scene_geometry.hpp>
+#include <taut/apps/program/scene_obstacle.hpp>
 #include <taut/core/fem/mesh_check.hpp>
 #include <taut/core/io/mesh_reader.hpp>
 #include <taut/core/report/error.hpp>
@@ -225,6 +226,13 @@ void add_forces(Scene const& scene, SceneGeometry& geometry) {
   }
 }
 
+void add_obstacles(Scene const& scene, SceneGeometry& geometry) {
+  for (std::size_t i = 0; i < scene.obstacles.size(); ++i)
+    if (scene.obstacles[i].is_surface())
+      geometry.obstacle_meshes.push_back(
+          {i, obstacle_surface(scene.obstacles[i], geometry.warnings)});
+}
+
 }  // namespace
 
 SceneGeometry build_geometry(Scene const& scene) {
@@ -233,6 +241,7 @@ SceneGeometry build_geometry(Scene const& scene) {
   for (SceneObject const& object : scene.objects) add_object(object, geometry);
   add_pins(scene, geometry);
   add_forces(scene, geometry);
+  add_obstacles(scene, geometry);
   return geometry;
 }
 

@@ -39,6 +39,12 @@ struct Force {
   Window window;
 };
 
+/// An obstacle that is a surface of triangles.
+struct ObstacleSurface {
+  std::size_t obstacle;  ///< index into Scene::obstacles, which has its motion
+  TriangleMesh mesh;     ///< at time 0, placed in the scene; closed ones oriented outward
+};
+
 struct SceneGeometry {
   TetMesh mesh;                 ///< at rest, placed in the scene
   std::vector<Point> start;     ///< m, positions at time 0; pinned vertices start at rest
@@ -49,11 +55,13 @@ struct SceneGeometry {
   std::vector<MaterialParameters> materials;
   std::vector<Pin> pins;  ///< no vertex is in two of them
   std::vector<Force> forces;
+  std::vector<ObstacleSurface> obstacle_meshes;
   std::vector<std::string> warnings;
 };
 
 /// Builds or reads the meshes and resolves all selections. Throws Error for a mesh that is not fit
-/// for simulation, a selection without vertices or tets, and a vertex held by two pins.
+/// for simulation, a selection without vertices or tets, a vertex held by two pins, and a surface
+/// that cannot be an obstacle.
 SceneGeometry build_geometry(Scene const& scene);
 
 }  // namespace taut

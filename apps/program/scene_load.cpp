@@ -3,6 +3,9 @@
 #include <taut/apps/program/scene_read.hpp>
 #include <taut/core/report/error.hpp>
 
+#include <algorithm>
+#include <map>
+
 namespace taut {
 namespace {
 
@@ -35,20 +38,51 @@ Sweep read_sweep(Section const& section) {
   return sweep;
 }
 
+/// Copies have names that the file does not show, and results name objects and obstacles alike.
+void require_own_names(Scene const& scene) {
+  std::map<std::string_view, std::string_view> taken;  // by whom
+  auto const take = [&](std::string const& name, std::string const& where) {
+    auto const [other, is_new] = taken.emplace(name, where);
+    if (!is_new)
+      throw Error("{}: the name '{}' is taken by {}: give it a name of its own", where, name,
+                  other->second);
+  };
+  for (SceneObject const& object : scene.objects) take(object.name, object.where);
+  for (SceneObstacle const& obstacle : scene.obstacles) take(obstacle.name, obstacle.where);
+}
+
+void warn_of_resolution(Scene& scene) {
+  auto const is_shape = [](auto const& part) {
+    return std::holds_alternative<ProceduralShape>(part.geometry);
+  };
+  if (scene.resolution == 1 || std::any_of(scene.objects.begin(), scene.objects.end(), is_shape) ||
+      std::any_of(scene.obstacles.begin(), scene.obstacles.end(), is_shape))
+    return;
+  scene.warnings.push_back(
+      fmt::format("{}: resolution = {} changes nothing: all meshes of the scene are files",
+                  scene.file.string(), scene.resolution));
+}
+
 Scene resolve(SceneValue const& document, std::filesystem::path const& file) {
   Section const root(document, "");
-  root.allow({"name", "description", "base", "gravity", "time", "object", "pin", "force", "contact",
-              "solver", "output", "small", "sweep"});
+  root.allow({"name", "description", "base", "gravity", "resolution", "time", "object", "obstacle",
+              "pin", "force", "contact", "solver", "output", "small", "sweep"});
   Scene scene;
   scene.file = file;
   scene.name = root.text("name", file.stem().string());
   scene.description = root.text("description", "");
   scene.gravity = root.point("gravity", "m/s^2", scene.gravity);
+  scene.resolution =
+      root.number("resolution", {.min = 0, .max = 1e3, .open_min = true}, scene.resolution);
   read_time(Section(root.at("time"), "time"), scene);
   for (Section const& object : root.list("object"))
-    scene.objects.push_back(read_object(object, scene));
+    for (SceneObject& copy : read_object(object, scene)) scene.objects.push_back(std::move(copy));
   if (scene.objects.empty())
     throw Error("{}: the scene has no objects: add an [[object]]", root.place());
+  for (Section const& obstacle : root.list("obstacle"))
+    scene.obstacles.push_back(read_obstacle(obstacle, scene));
+  require_own_names(scene);
+  warn_of_resolution(scene);
   for (Section const& pin : root.list("pin")) scene.pins.push_back(read_pin(pin, scene));
   for (Section const& force : root.list("force")) scene.forces.push_back(read_force(force, scene));
   if (auto const solver = root.section("solver")) scene.solver = SolverOptions(*solver);

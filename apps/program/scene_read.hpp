@@ -18,8 +18,21 @@ double radians(double degrees);
 std::filesystem::path find_data(SceneValue const& value, std::string_view path,
                                 std::filesystem::path const& scene_file);
 
+enum class ShapeOf { object, obstacle };
+/// The table `shape`; `factor` is of its resolution.
+ProceduralShape read_shape(Section const& shape, double factor, ShapeOf owner);
+/// The keys `scale`, `rotate` and `translate`.
+double read_scale(Section const& section);
+RigidMap read_placement(Section const& section);
+/// The keys `start` and `end`.
+Window read_window(Section const& section);
+/// The array `motion`: phases in order of time.
+RigidMotion read_motion(Section const& section);
+
 Selection read_selection(Section const& parent, std::filesystem::path const& scene_file);
-SceneObject read_object(Section const& section, Scene& scene);
+/// One object, or all copies of it.
+std::vector<SceneObject> read_object(Section const& section, Scene const& scene);
+SceneObstacle read_obstacle(Section const& section, Scene const& scene);
 ScenePin read_pin(Section const& section, Scene const& scene);
 SceneForce read_force(Section const& section, Scene const& scene);
 

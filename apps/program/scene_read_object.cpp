@@ -38,66 +38,6 @@ MaterialParameters read_material(Section const& section, MaterialParameters cons
   return material;
 }
 
-Shape read_shape_kind(Section const& s) {
-  constexpr std::array<std::string_view, 9> kinds{"box",      "beam", "sheet",  "boxes", "letter_e",
-                                                  "cylinder", "rod",  "sphere", "torus"};
-  std::string const kind = s.choice("kind", kinds);
-  auto const allow = [&](std::vector<std::string_view> keys) {
-    keys.insert(keys.end(), {"kind", "resolution"});
-    s.allow(keys);
-  };
-  auto const length = [&](std::string_view key) { return s.number(key, length_range); };
-  if (kind == "box") {
-    allow({"size"});
-    Point const size = s.point("size", "m");
-    for (double const edge : size)
-      if (!length_range.contains(edge))
-        throw Error("{}: {} has an edge of {} m: it must be {}", s.at("size").place, s.path("size"),
-                    edge, length_range.describe());
-    return BoxShape{size};
-  }
-  if (kind == "beam") {
-    allow({"length", "height", "width"});
-    return BoxShape{{length("length"), length("height"), length("width")}};
-  }
-  if (kind == "sheet") {
-    allow({"length", "width", "thickness"});
-    return BoxShape{{length("length"), length("thickness"), length("width")}};
-  }
-  if (kind == "boxes") {
-    allow({"boxes"});
-    BoxUnionShape shape;
-    for (SceneValue const& box : read_list(s.at("boxes"), s.path("boxes")))
-      shape.boxes.push_back(
-          read_box(box, fmt::format("{}[{}]", s.path("boxes"), shape.boxes.size())));
-    return shape;
-  }
-  if (kind == "letter_e") {
-    allow({"height", "depth"});
-    double const height = s.number("height", length_range, LetterEShape{}.height);
-    return LetterEShape{height, s.number("depth", length_range, height / 1.125)};
-  }
-  if (kind == "cylinder") {
-    allow({"radius", "height"});
-    return CylinderShape{length("radius"), length("height"), 1};
-  }
-  if (kind == "rod") {
-    allow({"radius", "length"});
-    return CylinderShape{length("radius"), length("length"), 0};
-  }
-  if (kind == "sphere") {
-    allow({"radius"});
-    return SphereShape{length("radius")};
-  }
-  allow({"radius", "tube_radius"});
-  return TorusShape{length("radius"), length("tube_radius")};
-}
-
-ProceduralShape read_shape(Section const& section) {
-  Shape const shape = read_shape_kind(section);
-  return {shape, section.integer("resolution", {.min = 1, .max = 1e6, .unit = "cells"})};
-}
-
 InitialVelocity read_velocity(Section const& section) {
   section.allow({"linear", "axis", "centre", "angular_velocity", "twist_length"});
   InitialVelocity velocity;
@@ -140,18 +80,6 @@ Start read_start(Section const& object) {
   return {};
 }
 
-RigidMap read_placement(Section const& object) {
-  RigidMap placement;
-  if (auto const rotate = object.section("rotate")) {
-    rotate->allow({"axis", "angle"});
-    placement = rotation_about(
-        rotate->direction("axis"),
-        radians(rotate->number("angle", {.min = -1e6, .max = 1e6, .unit = "deg"})), {});
-  }
-  placement.translation = object.point("translate", "m", Point{});
-  return placement;
-}
-
 /// A body that starts collapsed passes through J <= 0, which not every model is defined for.
 void require_start_allowed(SceneObject const& object) {
   if (std::holds_alternative<std::monostate>(object.start)) return;
@@ -165,6 +93,49 @@ void require_start_allowed(SceneObject const& object) {
   };
   check(object.material);
   for (SceneRegion const& region : object.regions) check(region.material);
+}
+
+/// copies = { count = [nx, ny, nz], step = [dx, dy, dz] }: a block of them, name-0 where the object
+/// itself is, numbered along x first. The centre of its velocity moves along.
+std::vector<SceneObject> copies_of(SceneObject const& object, Section const& section) {
+  auto const copies = section.section("copies");
+  if (!copies) return {object};
+  copies->allow({"count", "step"});
+  std::string const path = copies->path("count");
+  SceneValue::List const& list = read_list(copies->at("count"), path);
+  if (list.size() != 3)
+    throw Error("{}: {} is a list of {}: it must be a list of three whole numbers",
+                copies->at("count").place, path, list.size());
+  constexpr double most = 1e5;
+  std::array<std::int64_t, 3> count{};
+  double all = 1;
+  for (std::size_t a = 0; a < 3; ++a) {
+    count[a] = read_integer(list[a], fmt::format("{}[{}]", path, a),
+                            {.min = 1, .max = most, .unit = "copies"});
+    all *= static_cast<double>(count[a]);
+  }
+  if (all > most)
+    throw Error("{}: {} asks for {} copies: it must be at most {}", copies->at("count").place, path,
+                all, most);
+  Point const step = copies->point("step", "m");
+  for (std::size_t a = 0; a < 3; ++a)
+    if (count[a] > 1 && step[a] == 0)
+      throw Error("{}: {} is 0 along {}, where there are {} copies: give the way between two",
+                  copies->at("step").place, copies->path("step"), "xyz"[a], count[a]);
+
+  std::vector<SceneObject> block;
+  for (std::int64_t k = 0; k < count[2]; ++k)
+    for (std::int64_t j = 0; j < count[1]; ++j)
+      for (std::int64_t i = 0; i < count[0]; ++i) {
+        Point const way{static_cast<double>(i) * step[0], static_cast<double>(j) * step[1],
+                        static_cast<double>(k) * step[2]};
+        SceneObject copy = object;
+        copy.name = fmt::format("{}-{}", object.name, block.size());
+        copy.placement.translation = copy.placement.translation + way;
+        copy.velocity.centre = copy.velocity.centre + way;
+        block.push_back(std::move(copy));
+      }
+  return block;
 }
 
 }  // namespace
@@ -181,22 +152,22 @@ std::span<MaterialModel const> material_models() {
   return models;
 }
 
-SceneObject read_object(Section const& section, Scene& scene) {
-  section.allow({"name", "shape", "mesh", "scale", "rotate", "translate", "velocity", "material",
-                 "region", "start"});
+std::vector<SceneObject> read_object(Section const& section, Scene const& scene) {
+  section.allow({"name", "shape", "mesh", "scale", "rotate", "translate", "copies", "velocity",
+                 "material", "region", "start"});
   SceneObject object;
   object.where = section.where();
-  object.name = section.text("name");
+  object.name = object.copy_of = section.text("name");
   auto const shape = section.section("shape");
   SceneValue const* mesh = section.find("mesh");
   if (shape.has_value() == (mesh != nullptr))
     throw Error("{} has {}: give either a shape or a mesh", section.where(),
                 mesh ? "both a shape and a mesh" : "no geometry");
   if (shape)
-    object.geometry = read_shape(*shape);
+    object.geometry = read_shape(*shape, scene.resolution, ShapeOf::object);
   else
     object.geometry = find_data(*mesh, section.path("mesh"), scene.file);
-  object.scale = section.number("scale", {.min = 1e-9, .max = 1e9}, 1.0);
+  object.scale = read_scale(section);
   object.placement = read_placement(section);
   if (auto const velocity = section.section("velocity")) object.velocity = read_velocity(*velocity);
   Section const material(section.at("material"), section.path("material"));
@@ -209,7 +180,7 @@ SceneObject read_object(Section const& section, Scene& scene) {
   }
   object.start = read_start(section);
   require_start_allowed(object);
-  return object;
+  return copies_of(object, section);
 }
 
 }  // namespace taut

@@ -7,45 +7,21 @@
 namespace taut {
 namespace {
 
-/// Indices of the objects meant: the one named by the key `object`, or all without that key.
+/// Indices of the objects meant: the one named by the key `object`, all copies of what it names, or
+/// all without that key.
 std::vector<std::size_t> read_objects(Section const& section, Scene const& scene) {
-  std::vector<std::size_t> indices;
   std::vector<std::string_view> names;
-  for (SceneObject const& object : scene.objects) names.push_back(object.name);
-  if (!section.find("object")) {
-    for (std::size_t i = 0; i < names.size(); ++i) indices.push_back(i);
-    return indices;
+  for (SceneObject const& object : scene.objects) {
+    if (names.empty() || names.back() != object.copy_of) names.push_back(object.copy_of);
+    if (object.name != object.copy_of) names.push_back(object.name);
   }
-  std::string const name = section.choice("object", names);
-  for (std::size_t i = 0; i < names.size(); ++i)
-    if (names[i] == name) indices.push_back(i);
+  std::optional<std::string> name;
+  if (section.find("object")) name = section.choice("object", names);
+  std::vector<std::size_t> indices;
+  for (std::size_t i = 0; i < scene.objects.size(); ++i)
+    if (!name || scene.objects[i].copy_of == *name || scene.objects[i].name == *name)
+      indices.push_back(i);
   return indices;
-}
-
-Window read_window(Section const& section) {
-  Window window;
-  window.start = section.number("start", time_range, 0.0);
-  if (section.find("end"))
-    window.end = section.number(
-        "end", {.min = window.start, .max = time_range.max, .open_min = true, .unit = "s"});
-  return window;
-}
-
-MotionPhase read_phase(Section const& section) {
-  section.allow({"name", "start", "end", "velocity", "axis", "centre", "angular_velocity",
-                 "angular_acceleration"});
-  MotionPhase phase;
-  phase.window = read_window(section);
-  phase.velocity = section.point("velocity", "m/s", phase.velocity);
-  phase.angular_velocity =
-      radians(section.number("angular_velocity", {.min = -1e9, .max = 1e9, .unit = "deg/s"}, 0.0));
-  phase.angular_acceleration = radians(
-      section.number("angular_acceleration", {.min = -1e9, .max = 1e9, .unit = "deg/s^2"}, 0.0));
-  bool const turns = phase.angular_velocity != 0 || phase.angular_acceleration != 0;
-  std::optional<Point> const none;
-  phase.axis = section.direction("axis", turns ? none : phase.axis);
-  phase.centre = section.point("centre", "m", turns ? none : phase.centre);
-  return phase;
 }
 
 Selector read_side(Section const& section, std::optional<double> within) {
@@ -98,6 +74,15 @@ Selector read_selector(SceneValue const& value, std::string const& path,
 
 }  // namespace
 
+Window read_window(Section const& section) {
+  Window window;
+  window.start = section.number("start", time_range, 0.0);
+  if (section.find("end"))
+    window.end = section.number(
+        "end", {.min = window.start, .max = time_range.max, .open_min = true, .unit = "s"});
+  return window;
+}
+
 double radians(double degrees) { return degrees * std::numbers::pi / 180; }
 
 std::filesystem::path find_data(SceneValue const& value, std::string_view path,
@@ -142,17 +127,7 @@ ScenePin read_pin(Section const& section, Scene const& scene) {
   if (section.find("release"))
     pin.window.end =
         section.number("release", {.min = 0, .max = time_range.max, .open_min = true, .unit = "s"});
-  double last_end = 0;
-  for (Section const& entry : section.list("motion")) {
-    MotionPhase const phase = read_phase(entry);
-    if (phase.window.start < last_end)
-      throw Error(
-          "{}: starts at {} s, before the phase above it ends at {} s: give the phases in "
-          "order of time, without overlap",
-          entry.where(), phase.window.start, last_end);
-    last_end = phase.window.end;
-    pin.motion.phases.push_back(phase);
-  }
+  pin.motion = read_motion(section);
   return pin;
 }
 

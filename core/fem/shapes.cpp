@@ -1,4 +1,6 @@
+#include <taut/core/fem/lattice.hpp>
 #include <taut/core/fem/shapes.hpp>
+#include <taut/core/fem/subdivision.hpp>
 #include <taut/core/report/error.hpp>
 
 #include <algorithm>
@@ -10,142 +12,6 @@
 namespace taut {
 namespace {
 
-constexpr std::int64_t max_cells = std::int64_t{1} << 24;
-
-using Cell = std::array<int, 3>;
-
-/// Cells of a lattice, filled or empty. Axis 2 may close on itself.
-class Lattice {
-public:
-  explicit Lattice(Cell const& size, bool filled = true, bool periodic = false)
-      : size_(size), periodic_(periodic) {
-    std::int64_t count = 1;
-    for (int const n : size) {
-      count *= n;  // each factor and the product so far are below 2^31 and 2^24: no overflow
-      if (count > max_cells)
-        throw Error("the shape needs more than {} lattice cells: lower its resolution", max_cells);
-    }
-    filled_.assign(static_cast<std::size_t>(count), filled);
-  }
-
-  void fill(Cell const& low, Cell const& high) {
-    for (int i = low[0]; i < high[0]; ++i)
-      for (int j = low[1]; j < high[1]; ++j)
-        for (int k = low[2]; k < high[2]; ++k) filled_[index({i, j, k})] = true;
-  }
-
-  bool filled(Cell cell) const {
-    if (periodic_) cell[2] = (cell[2] + size_[2]) % size_[2];
-    for (std::size_t a = 0; a < 3; ++a)
-      if (cell[a] < 0 || cell[a] >= size_[a]) return false;
-    return filled_[index(cell)];
-  }
-
-  Cell const& size() const { return size_; }
-  bool periodic() const { return periodic_; }
-
-private:
-  std::size_t index(Cell const& c) const {
-    return static_cast<std::size_t>((c[0] * size_[1] + c[1]) * size_[2] + c[2]);
-  }
-
-  Cell size_;
-  bool periodic_;
-  std::vector<bool> filled_;
-};
-
-/// Whether the cells in `mask` (bit 4x + 2y + z of a 2 x 2 x 2 block) hang together by faces.
-bool face_connected(unsigned mask) {
-  unsigned reached = mask & (0u - mask);
-  for (unsigned last = 0; reached != last;) {
-    last = reached;
-    reached |= ((reached & 0xF0u) >> 4 | (reached & 0x0Fu) << 4 | (reached & 0xCCu) >> 2 |
-                (reached & 0x33u) << 2 | (reached & 0xAAu) >> 1 | (reached & 0x55u) << 1) &
-               mask;
-  }
-  return reached == mask;
-}
-
-/// The boundary of a union of cells is a manifold when around every vertex both the filled and the
-/// empty cells hang together by faces (well-composed sets: Latecki 1997).
-void require_manifold(Lattice const& lattice) {
-  auto const [nx, ny, nz] = lattice.size();
-  for (int i = 0; i <= nx; ++i)
-    for (int j = 0; j <= ny; ++j)
-      for (int k = 0; k <= nz; ++k) {
-        unsigned mask = 0;
-        for (int b = 0; b < 8; ++b) {
-          bool const filled =
-              lattice.filled({i - 1 + (b >> 2), j - 1 + (b >> 1 & 1), k - 1 + (b & 1)});
-          mask |= static_cast<unsigned>(filled) << b;
-        }
-        if (!face_connected(mask) || !face_connected(~mask & 0xFFu))
-          throw Error(
-              "boxes of the union touch in an edge or a vertex only, at lattice vertex ({}, {}, "
-              "{}): "
-              "let them share a face or keep them apart",
-              i, j, k);
-      }
-}
-
-/// Splits the filled cells into tets. `map` takes lattice coordinates u in [-1, 1]^3, exactly
-/// antisymmetric about the middle, to a point.
-template <class Map>
-TetMesh split(Lattice const& lattice, Map const& map) {
-  // Vertices sit on the lattice refined by two: corners at even coordinates, centres of cells at
-  // odd.
-  Cell const& n = lattice.size();
-  Cell const doubled{2 * n[0] + 1, 2 * n[1] + 1, lattice.periodic() ? 2 * n[2] : 2 * n[2] + 1};
-  auto const vertex = [&](Cell const& c) {
-    int const z = lattice.periodic() ? (c[2] + doubled[2]) % doubled[2] : c[2];
-    return static_cast<std::int32_t>((c[0] * doubled[1] + c[1]) * doubled[2] + z);
-  };
-
-  TetMesh mesh;
-  for (std::size_t a = 0; a < 3; ++a) {
-    std::size_t const b = (a + 1) % 3, c = (a + 2) % 3;
-    bool const closed = a == 2 && lattice.periodic();
-    for (int i = 0; i <= n[a] - closed; ++i)
-      for (int j = 0; j < n[b]; ++j)
-        for (int k = 0; k < n[c]; ++k) {
-          auto const at = [&](int along, int across, int up) {
-            Cell r{};
-            r[a] = along, r[b] = across, r[c] = up;
-            return r;
-          };
-          bool const below = lattice.filled(at(i - 1, j, k)), above = lattice.filled(at(i, j, k));
-          if (!below && !above) continue;
-          std::int32_t const low = vertex(at(below ? 2 * i - 1 : 2 * i, 2 * j + 1, 2 * k + 1));
-          std::int32_t const high = vertex(at(above ? 2 * i + 1 : 2 * i, 2 * j + 1, 2 * k + 1));
-          std::array<std::int32_t, 4> const ring{
-              vertex(at(2 * i, 2 * j, 2 * k)), vertex(at(2 * i, 2 * j + 2, 2 * k)),
-              vertex(at(2 * i, 2 * j + 2, 2 * k + 2)), vertex(at(2 * i, 2 * j, 2 * k + 2))};
-          for (std::size_t m = 0; m < 4; ++m)
-            mesh.tets.push_back({low, ring[m], ring[(m + 1) % 4], high});
-        }
-  }
-
-  std::vector<std::int32_t> number(static_cast<std::size_t>(doubled[0]) *
-                                       static_cast<std::size_t>(doubled[1]) *
-                                       static_cast<std::size_t>(doubled[2]),
-                                   -1);
-  for (Tet const& tet : mesh.tets)
-    for (std::int32_t const v : tet) number[static_cast<std::size_t>(v)] = 0;
-  auto const coordinate = [](int i, int cells) { return static_cast<double>(i - cells) / cells; };
-  std::size_t next = 0;
-  for (int i = 0; i < doubled[0]; ++i)
-    for (int j = 0; j < doubled[1]; ++j)
-      for (int k = 0; k < doubled[2]; ++k, ++next) {
-        if (number[next] < 0) continue;
-        number[next] = static_cast<std::int32_t>(mesh.points.size());
-        mesh.points.push_back(
-            map(Point{coordinate(i, n[0]), coordinate(j, n[1]), coordinate(k, n[2])}));
-      }
-  for (Tet& tet : mesh.tets)
-    for (std::int32_t& v : tet) v = number[static_cast<std::size_t>(v)];
-  return mesh;
-}
-
 void require_size(double value, std::string_view what) {
   if (!(value > 0) || !std::isfinite(value))
     throw Error("the {} of the shape is {} m: it must be positive and finite", what, value);
@@ -154,7 +20,7 @@ void require_size(double value, std::string_view what) {
 /// Number of cells of size h along a length, for cells as near to cubes as possible.
 int cells_along(double length, double h) {
   return static_cast<int>(
-      std::clamp(std::round(length / h), 1.0, static_cast<double>(max_cells) + 1));
+      std::clamp(std::round(length / h), 1.0, static_cast<double>(max_lattice_cells) + 1));
 }
 
 /// From the square [-1, 1]^2 or cube [-1, 1]^3 onto the unit disk or ball, shell by shell.
@@ -182,39 +48,62 @@ TetMesh make(BoxShape const& box, int resolution) {
   });
 }
 
+/// The bounding box of a union of boxes.
+struct Extent {
+  Point low, high;
+
+  explicit Extent(BoxUnionShape const& shape)
+      : low(shape.boxes.front()[0]), high(shape.boxes.front()[1]) {
+    for (auto const& [box_low, box_high] : shape.boxes)
+      for (std::size_t a = 0; a < 3; ++a) {
+        low[a] = std::min(low[a], box_low[a]);
+        high[a] = std::max(high[a], box_high[a]);
+      }
+  }
+  Point size() const { return {high[0] - low[0], high[1] - low[1], high[2] - low[2]}; }
+  double longest() const {
+    Point const edges = size();
+    return *std::max_element(edges.begin(), edges.end());
+  }
+};
+
+/// Whether all corners are vertices of the lattice with so many cells along the longest edge.
+bool fits(BoxUnionShape const& shape, Extent const& extent, int cells) {
+  double const h = extent.longest() / cells;
+  for (auto const& box : shape.boxes)
+    for (Point const& corner : box)
+      for (std::size_t a = 0; a < 3; ++a) {
+        double const steps = (corner[a] - extent.low[a]) / h;
+        if (!(std::abs(steps - std::round(steps)) <= 1e-6)) return false;
+      }
+  return true;
+}
+
+/// The coarsest lattice that fits, or 0.
+int coarsest_lattice(BoxUnionShape const& shape, Extent const& extent) {
+  for (int cells = 1; cells < 1000; ++cells)
+    if (fits(shape, extent, cells)) return cells;
+  return 0;
+}
+
 TetMesh make(BoxUnionShape const& shape, int resolution) {
   if (shape.boxes.empty()) throw Error("the union has no boxes: give at least one");
-  Point low = shape.boxes.front()[0], high = shape.boxes.front()[1];
   for (auto const& [box_low, box_high] : shape.boxes)
-    for (std::size_t a = 0; a < 3; ++a) {
+    for (std::size_t a = 0; a < 3; ++a)
       require_size(box_high[a] - box_low[a], "size of a box (highest minus lowest corner)");
-      low[a] = std::min(low[a], box_low[a]);
-      high[a] = std::max(high[a], box_high[a]);
-    }
-  Point const size{high[0] - low[0], high[1] - low[1], high[2] - low[2]};
-  double const longest = *std::max_element(size.begin(), size.end());
-
-  auto const fits = [&](int cells) {
-    double const h = longest / cells;
-    for (auto const& box : shape.boxes)
-      for (Point const& corner : box)
-        for (std::size_t a = 0; a < 3; ++a) {
-          double const steps = (corner[a] - low[a]) / h;
-          if (std::abs(steps - std::round(steps)) > 1e-6) return false;
-        }
-    return true;
-  };
-  if (!fits(resolution)) {
-    int other = 1;
-    while (other < 1000 && !fits(other)) ++other;
-    if (other == 1000)
+  Extent const extent(shape);
+  auto const& [low, high] = extent;
+  Point const size = extent.size();
+  if (!fits(shape, extent, resolution)) {
+    int const other = coarsest_lattice(shape, extent);
+    if (other == 0)
       throw Error(
           "the corners of the boxes lie on no common lattice: give multiples of one length");
     throw Error("the boxes' corners are off the lattice of resolution {}: use a multiple of {}",
                 resolution, other);
   }
 
-  double const h = longest / resolution;
+  double const h = extent.longest() / resolution;
   auto const lattice_corner = [&](Point const& corner) {
     Cell cell{};
     for (std::size_t a = 0; a < 3; ++a)
@@ -227,7 +116,8 @@ TetMesh make(BoxUnionShape const& shape, int resolution) {
   require_manifold(lattice);
   return split(lattice, [&](Point const& u) {
     Point p{};
-    for (std::size_t a = 0; a < 3; ++a) p[a] = (low[a] + high[a]) / 2 + u[a] * size[a] / 2;
+    for (std::size_t a = 0; a < 3; ++a)
+      p[a] = (extent.low[a] + extent.high[a]) / 2 + u[a] * size[a] / 2;
     return p;
   });
 }
@@ -294,7 +184,98 @@ TetMesh make(TorusShape const& torus, int resolution) {
   });
 }
 
+/// The widest angle of a cell in a curved wall, rad: the line between the middles of two neighbours
+/// passes through the face between them, and leaves a half of it on either side.
+double widest_cell(double radius, double thickness) {
+  return 2 * std::acos(1 - thickness / (4 * (radius + thickness)));
+}
+
+TetMesh make(BowlShape const& bowl, int resolution) {
+  require_size(bowl.radius, "radius");
+  require_size(bowl.thickness, "thickness");
+  require_size(bowl.height, "height");
+  if (bowl.height > 1.8 * bowl.radius)
+    throw Error("the bowl has height {} m and radius {} m: it is closed above 1.8 radii",
+                bowl.height, bowl.radius);
+  double const rim = std::acos(1 - bowl.height / bowl.radius);
+  double const coarsest = widest_cell(bowl.radius, bowl.thickness);
+  int const across = std::max(resolution, cells_along(2 * rim, coarsest));
+  int const layers = cells_along(bowl.thickness, 2 * rim * bowl.radius / across);
+  return split(Lattice({across, layers, across}), [&](Point const& u) {
+    auto const disk = onto_ball<2>({u[0], u[2]});
+    double const shell = std::hypot(disk[0], disk[1]);
+    double const distance = bowl.radius + bowl.thickness * (1 - u[1]) / 2;
+    double const out = shell > 0 ? distance * std::sin(rim * shell) / shell : 0;
+    return Point{out * disk[0], -distance * std::cos(rim * shell), out * disk[1]};
+  });
+}
+
+TetMesh make(FunnelShape const& funnel, int resolution) {
+  require_size(funnel.radius, "radius");
+  require_size(funnel.throat, "throat");
+  require_size(funnel.height, "height");
+  require_size(funnel.spout, "spout");
+  require_size(funnel.thickness, "thickness");
+  if (funnel.throat >= funnel.radius)
+    throw Error("the funnel has throat {} m and radius {} m: the throat must be the smaller one",
+                funnel.throat, funnel.radius);
+  if (funnel.thickness >= funnel.spout)
+    throw Error("the funnel has thickness {} m and spout {} m: the spout must be the longer one",
+                funnel.thickness, funnel.spout);
+  double const wider = funnel.radius - funnel.throat, slant = std::hypot(wider, funnel.height);
+  // Where the wall bends, cells so short that the line between the middles of two stays within it.
+  double const half_turn = std::atan2(wider, funnel.height) / 2;
+  double const h =
+      std::min((funnel.spout + slant) / resolution, funnel.thickness / (2 * std::sin(half_turn)));
+  int const below = cells_along(funnel.spout, h), above = cells_along(slant, h);
+  int const thick = cells_along(funnel.thickness, h);
+  double const turn = std::numbers::pi * (funnel.radius + funnel.throat);
+  double const coarsest = widest_cell(funnel.radius, funnel.thickness / thick);
+  int const around =
+      std::max({8, cells_along(turn, h), cells_along(2 * std::numbers::pi, coarsest)});
+  // The outside is a mitre joint of two offset lines; (distance from the axis, height) of its ends.
+  using Corner = std::array<double, 2>;
+  double const across = funnel.thickness * funnel.height / slant;
+  double const down = funnel.thickness * wider / slant;
+  double const mitre = funnel.thickness * wider / (slant + funnel.height);
+  std::array<Corner, 3> const inside{
+      {{funnel.throat, -funnel.spout}, {funnel.throat, 0}, {funnel.radius, funnel.height}}};
+  std::array<Corner, 3> const outside{{{funnel.throat + funnel.thickness, -funnel.spout},
+                                       {funnel.throat + funnel.thickness, -mitre},
+                                       {funnel.radius + across, funnel.height - down}}};
+  int const along = below + above;
+  return split(Lattice({thick, along, around}, true, true), [&](Point const& u) {
+    double const cells = (u[1] + 1) / 2 * along;  // from the lower end
+    bool const in_cone = cells > below;
+    double const s = in_cone ? (cells - below) / above : cells / below, out = (u[0] + 1) / 2;
+    std::size_t const first = in_cone ? 1 : 0;
+    auto const at = [&](std::size_t c) {
+      auto const on = [&](std::array<Corner, 3> const& line) {
+        return (1 - s) * line[first][c] + s * line[first + 1][c];
+      };
+      return (1 - out) * on(inside) + out * on(outside);
+    };
+    double const angle = std::numbers::pi * u[2];
+    return Point{at(0) * std::cos(angle), at(1), at(0) * std::sin(angle)};
+  });
+}
+
+TetMesh make(TetsShape const& tets, int resolution) { return split_edges(tets.mesh, resolution); }
+
+struct ResolutionUnit {
+  int operator()(LetterEShape const&) const { return 9; }
+  int operator()(BoxUnionShape const& shape) const {
+    return shape.boxes.empty() ? 1 : std::max(1, coarsest_lattice(shape, Extent(shape)));
+  }
+  template <class Other>
+  int operator()(Other const&) const {
+    return 1;
+  }
+};
+
 }  // namespace
+
+int resolution_unit(Shape const& shape) { return std::visit(ResolutionUnit{}, shape); }
 
 TetMesh make_shape(Shape const& shape, int resolution) {
   if (resolution < 1) throw Error("the resolution is {}: it must be at least 1", resolution);

@@ -13,7 +13,7 @@
 // map of Shirley and Chiu 1997, "A low distortion map between disk and square"; in space it is the
 // equiangular cubed sphere (Ronchi, Iacono, Paolucci 1996). Both are homogeneous of degree one, so
 // refinement keeps the worst tet's shape; a smooth map cannot (it is singular where two faces
-// become one surface).
+// become one surface). The disk becomes the bowl by equal angles from the pole.
 //
 // Boundary vertices lie on the exact surface, so the volume converges at second order. Every mesh
 // is conforming and positively oriented, and its boundary is a closed manifold.
@@ -64,13 +64,43 @@ struct TorusShape {
   double tube_radius = 0.15;  ///< m, below `radius`
 };
 
-using Shape =
-    std::variant<BoxShape, BoxUnionShape, LetterEShape, CylinderShape, SphereShape, TorusShape>;
+/// What lies between two balls around the origin and, seen from there, below the rim: a bowl that
+/// is open at the top (y). Resolution: cells from rim to rim along the inside, at least as many as
+/// a wall so thin needs to bend.
+struct BowlShape {
+  double radius = 0.5;      ///< m, of the inner ball
+  double thickness = 0.05;  ///< m
+  double height = 0.5;      ///< m, of the rim above the bottom, inside; at most 1.8 radii
+};
+
+/// A tube that widens into a cone, both around the y axis and open; they meet at the height of the
+/// origin, the cone above. Resolution: cells from end to end along the inside. There, and around
+/// it, are at least as many as a wall so thin needs to bend.
+struct FunnelShape {
+  double radius = 0.5;      ///< m, inside, at the top
+  double throat = 0.15;     ///< m, inside, of the tube; below `radius`
+  double height = 0.5;      ///< m, of the cone
+  double spout = 0.2;       ///< m, length of the tube, above `thickness`
+  double thickness = 0.05;  ///< m
+};
+
+/// Tets given one by one. Resolution: the pieces that each of their edges is cut into
+/// (core/fem/subdivision.hpp).
+struct TetsShape {
+  TetMesh mesh;
+};
+
+using Shape = std::variant<BoxShape, BoxUnionShape, LetterEShape, CylinderShape, SphereShape,
+                           TorusShape, BowlShape, FunnelShape, TetsShape>;
 
 /// The tet mesh of a shape; vertices in lexicographic order of the lattice.
 /// Throws Error for a size that is not positive and finite, a resolution below 1 or beyond 2^24
-/// cells, boxes off the lattice, boxes that touch in an edge or a vertex only, and a torus without
-/// a hole.
+/// cells, boxes off the lattice, boxes that touch in an edge or a vertex only, a torus without a
+/// hole, a funnel that does not narrow, and tets with a vertex that does not exist.
 TetMesh make_shape(Shape const& shape, int resolution);
+
+/// What a shape's resolution must be a multiple of: 9 for the letter E, the coarsest common lattice
+/// of a union of boxes (1 if there is none), 1 for all others.
+int resolution_unit(Shape const& shape);
 
 }  // namespace taut

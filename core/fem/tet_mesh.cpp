@@ -36,6 +36,21 @@ std::vector<Triangle> boundary_faces(std::vector<Tet> const& tets) {
   return boundary;
 }
 
+TriangleMesh boundary_surface(TetMesh const& mesh) {
+  TriangleMesh surface{{}, boundary_faces(mesh.tets)};
+  std::vector<std::int32_t> number(mesh.points.size(), -1);
+  for (Triangle const& triangle : surface.triangles)
+    for (const std::int32_t v : triangle) number[static_cast<std::size_t>(v)] = 0;
+  for (std::size_t v = 0; v < number.size(); ++v) {
+    if (number[v] < 0) continue;
+    number[v] = static_cast<std::int32_t>(surface.points.size());
+    surface.points.push_back(mesh.points[v]);
+  }
+  for (Triangle& triangle : surface.triangles)
+    for (std::int32_t& v : triangle) v = number[static_cast<std::size_t>(v)];
+  return surface;
+}
+
 std::vector<Edge> edges_of(std::span<Triangle const> triangles) {
   std::vector<Edge> edges;
   for (Triangle const& t : triangles)

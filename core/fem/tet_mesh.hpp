@@ -27,6 +27,10 @@ struct TriangleMesh {
 /// indices are those of the tet mesh.
 std::vector<Triangle> boundary_faces(std::vector<Tet> const& tets);
 
+/// The boundary of a tet mesh as a surface of its own: its vertices in the order of the mesh,
+/// without those inside.
+TriangleMesh boundary_surface(TetMesh const& mesh);
+
 /// The edges of the triangles: each once, the smaller vertex first, in lexicographic order.
 std::vector<Edge> edges_of(std::span<Triangle const> triangles);
 

@@ -42,7 +42,12 @@ TEST_CASE("the size of a mesh is known before it is built", "[memory]") {
         "{ kind = 'sphere', radius = 1, resolution = 8 }",
         "{ kind = 'torus', radius = 2, tube_radius = 0.5, resolution = 4 }",
         "{ kind = 'boxes', boxes = [[[0, 0, 0], [4, 1, 1]], [[0, 1, 0], [1, 4, 1]]], resolution = "
-        "12 }"}) {
+        "12 }",
+        "{ kind = 'bowl', radius = 1, thickness = 0.3, height = 0.8, resolution = 12 }",
+        "{ kind = 'funnel', radius = 1, throat = 0.5, height = 0.8, spout = 0.5, thickness = 0.2, "
+        "resolution = 8 }",
+        "{ kind = 'tets', points = [[0,0,0], [1,0,0], [0,1,0], [0,0,1]], tets = [[0,1,2,3]], "
+        "resolution = 12 }"}) {
     INFO(shape);
     check_close(scene_of(shape));
   }

@@ -211,3 +211,56 @@ TEST_CASE("only what is near is suggested") {
           "solver.method is 'simulated_annealing': choose one of dk,");
   refused(plain_scene + "[solver]\ncolour = 1", "unknown key 'solver.colour': solver knows");
 }
+
+TEST_CASE("copies and tets are judged entry by entry") {
+  auto const copies = [](std::string const& table, std::string const& sentence) {
+    spoilt("name = \"cube\"", "name = \"cube\"\ncopies = " + table, sentence);
+  };
+  copies("3", "scene.toml:10: object.cube.copies is a whole number: it must be a table");
+  copies("{ step = [1, 1, 1] }", "object.cube.copies lacks the key 'count'");
+  copies("{ count = [1, 2, 3] }", "object.cube.copies lacks the key 'step'");
+  copies("{ count = [1, 2], step = [1, 1, 1] }",
+         "object.cube.copies.count is a list of 2: it must be a list of three whole numbers");
+  copies("{ count = [1, 0, 1], step = [1, 1, 1] }", "copies.count[1] is 0: it must be at least 1");
+  copies("{ count = [1, 1.5, 1], step = [1, 1, 1] }", "count[1] is a number: it must be a whole");
+  copies("{ count = [1000, 1000, 1000], step = [1, 1, 1] }",
+         "asks for 1000000000 copies: it must be at most 100000");
+  copies("{ count = [1, 2, 1], step = [1, 0, 1] }",
+         "scene.toml:10: object.cube.copies.step is 0 along y, where there are 2 copies");
+  copies("{ count = [1, 1, 1], steps = [1, 1, 1] }", "the nearest is 'step'");
+  std::string const two =
+      replaced(plain_scene, "name = \"cube\"",
+               "name = \"cube\"\ncopies = { count = [2, 1, 1], step = [2, 0, 0] }");
+  std::string const body = plain_scene.substr(plain_scene.find("[[object]]"));
+  refused(two + replaced(body, "\"cube\"", "\"cube-1\""),
+          "object.cube-1: the name 'cube-1' is taken by");
+  refused(replaced(two, "name = \"floor\"", "object = \"cube-2\""),
+          "pin.0.object is 'cube-2', nearest is 'cube-");
+
+  std::string const shape = "{ kind = \"box\", size = [1, 1, 1], resolution = 2 }";
+  auto const tets = [&](std::string const& points, std::string const& list,
+                        std::string const& sentence) {
+    spoilt(shape, "{ kind = \"tets\", points = " + points + ", tets = " + list + " }", sentence);
+  };
+  std::string const four = "[[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]]";
+  tets(four, "[[0, 1, 2]]",
+       "shape.tets[0] is a list of 3: a tet is a list of the numbers of four points");
+  tets(four, "[[0, 1, 2, 4]]", "shape.tets[0][3] is 4: it must be at least 0 and at most 3");
+  tets(four, "[[0, 1, 2, -1]]", "shape.tets[0][3] is -1");
+  tets("[[0, 0]]", "[[0, 1, 2, 3]]",
+       "points[0] is a list of 2: it must be a list of three numbers");
+  tets("[]", "[[0, 1, 2, 3]]", "shape.points is empty: give the points that the tets name");
+  auto const build_refused = [&](std::string const& list, std::string const& sentence) {
+    CHECK_THROWS_MATCHES(build_geometry(load(replaced(
+                             plain_scene, shape,
+                             "{ kind = \"tets\", points = " + four + ", tets = " + list + " }"))),
+                         Error, MessageMatches(ContainsSubstring(sentence)));
+  };
+  build_refused("[]", "object.cube.shape");
+  build_refused("[[0, 1, 2, 2]]", "of zero volume");
+  build_refused("[[0, 1, 2, 3], [0, 1, 2, 3]]", "object.cube.shape");
+  refused(
+      replaced(plain_scene, "resolution = 2", "resolution = 100000") + "[small]\nresolution = 20\n",
+      "scene.toml:10: the resolution 100000 of object.cube.shape, times that of the scene, 20, is "
+      "above 1000000 cells: lower one");
+}

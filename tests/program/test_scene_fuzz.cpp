@@ -88,14 +88,28 @@ private:
 };
 
 /// Whether the geometry is small enough to be built thousands of times.
+bool quick(ProceduralShape const& shape) {
+  if (shape.resolution > 9) return false;
+  if (auto const* rod = std::get_if<CylinderShape>(&shape.shape))
+    return rod->length <= 10 * rod->radius;
+  if (auto const* torus = std::get_if<TorusShape>(&shape.shape))
+    return torus->radius <= 10 * torus->tube_radius;
+  if (auto const* funnel = std::get_if<FunnelShape>(&shape.shape))
+    return funnel->radius + funnel->thickness <= 10 * (funnel->height + funnel->spout);
+  if (auto const* bowl = std::get_if<BowlShape>(&shape.shape))
+    return bowl->thickness <= 10 * bowl->height;
+  return true;
+}
+
 bool quick(Scene const& scene) {
+  if (scene.objects.size() > 20) return false;
   for (SceneObject const& object : scene.objects) {
     auto const* shape = std::get_if<ProceduralShape>(&object.geometry);
-    if (shape == nullptr || shape->resolution > 9) return false;
-    if (auto const* rod = std::get_if<CylinderShape>(&shape->shape))
-      if (rod->length > 10 * rod->radius) return false;
-    if (auto const* torus = std::get_if<TorusShape>(&shape->shape))
-      if (torus->radius > 10 * torus->tube_radius) return false;
+    if (shape == nullptr || !quick(*shape)) return false;
+  }
+  for (SceneObstacle const& obstacle : scene.obstacles) {
+    auto const* shape = std::get_if<ProceduralShape>(&obstacle.geometry);
+    if (shape != nullptr && !quick(*shape)) return false;
   }
   return true;
 }
@@ -123,6 +137,31 @@ material = { model = "arap", young = 1e5, poisson = 0.4, density = 1000 }
 name = "frame"
 shape = { kind = "boxes", boxes = [[[0, 0, 0], [2, 1, 1]], [[0, 1, 0], [1, 2, 1]]], resolution = 2 }
 material = { model = "arap", young = 1e5, poisson = 0.4, density = 1000 }
+
+[[object]]
+name = "tets"
+shape = { kind = "tets", points = [[9, 0, 0], [8, 0, 0], [9, 1, 0], [9, 0, 1]], tets = [[0, 1, 2, 3]] }
+copies = { count = [2, 1, 2], step = [0, 3, 4] }
+material = { young = 1e5, poisson = 0.4, density = 1000 }
+
+[[obstacle]]
+name = "ground"
+shape = { kind = "half_space", point = [0, -5, 0] }
+friction = 0.3
+
+[[obstacle]]
+name = "room"
+shape = { kind = "box", inside = true, size = [20, 20, 20] }
+motion = [{ velocity = [0, 1, 0] }]
+
+[[obstacle]]
+name = "funnel"
+shape = { kind = "funnel", radius = 2, throat = 1, height = 1, spout = 0.5, thickness = 0.1, resolution = 3 }
+
+[[obstacle]]
+name = "cup"
+shape = { kind = "bowl", radius = 2, thickness = 0.3, height = 1, resolution = 3 }
+scale = 2
 
 [solver]
 tolerance = 1e-3

@@ -250,3 +250,59 @@ TEST_CASE("geometry that cannot be simulated is refused with a sentence") {
                    "{ kind = \"letter_e\", resolution = 10 }"),
           "object.cube.shape: the letter E has resolution 10");
 }
+
+TEST_CASE("copies are objects of their own; pins, forces and regions reach all of them") {
+  std::string const block = replaced(plain_scene, "name = \"cube\"", R"(name = "cube"
+translate = [10, 0, 0]
+velocity = { axis = [0, 1, 0], centre = [10, 0, 0], angular_velocity = 180 }
+copies = { count = [2, 1, 3], step = [2, 0, -3] })") +
+                            R"(
+[[object]]
+name = "ball"
+shape = { kind = "sphere", radius = 0.5, resolution = 2 }
+translate = [-5, 0, 0]
+material = { young = 1e5, poisson = 0.4, density = 1000 }
+
+[[force]]
+object = "cube"
+acceleration = [1, 0, 0]
+
+[[force]]
+object = "cube-4"
+acceleration = [2, 0, 0]
+)";
+  SceneGeometry const geometry = build(block);
+  REQUIRE(geometry.objects.size() == 7);
+  std::size_t const vertices = 59;
+  for (std::size_t copy = 0; copy < 6; ++copy) {
+    ObjectPart const& part = geometry.objects[copy];
+    CHECK(part.name == "cube-" + std::to_string(copy));
+    CHECK(part.first_vertex == static_cast<std::int32_t>(copy * vertices));
+    Point const way{2.0 * static_cast<double>(copy % 2), 0, -3.0 * static_cast<double>(copy / 2)};
+    for (std::size_t v = 0; v < vertices; ++v) {
+      Point const& x = geometry.mesh.points[copy * vertices + v];
+      REQUIRE_THAT(norm(x - geometry.mesh.points[v] - way), WithinAbs(0, 1e-12));
+      REQUIRE_THAT(norm(geometry.velocity[copy * vertices + v] - geometry.velocity[v]),
+                   WithinAbs(0, 1e-12));  // each turns about its own centre
+    }
+  }
+  CHECK(geometry.objects[6].name == "ball");
+  CHECK(geometry.pins.at(0).vertices.size() == 6 * 13 + 1);
+  CHECK(geometry.forces.at(0).vertices.size() == 6 * vertices);
+  REQUIRE(geometry.forces.at(1).vertices.size() == vertices);
+  CHECK(geometry.forces.at(1).vertices.front() == static_cast<std::int32_t>(4 * vertices));
+}
+
+TEST_CASE("tets are given one by one, as they are or finer") {
+  std::string const pyramid =
+      "{ kind = \"tets\", points = [[0, 0, 0], [1, 0, 0], [1, 0, 1], [0, 0, 1], [0.5, 3, 0.5]], "
+      "tets = [[0, 2, 1, 4], [3, 2, 0, 4]]@ }";
+  std::string const old = "{ kind = \"box\", size = [1, 1, 1], resolution = 2 }";
+  auto const with = [&](std::string const& more) {
+    return build(replaced(plain_scene, old, replaced(pyramid, "@", more))).mesh;
+  };
+  CHECK(with("").tets.size() == 2);
+  CHECK(with("").points.size() == 5);
+  CHECK(with("").points[4] == Point{0.5, 3, 0.5});
+  CHECK(with(", resolution = 3").tets.size() == 2 * 27);
+}

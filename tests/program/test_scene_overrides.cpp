@@ -129,6 +129,9 @@ TEST_CASE("overrides are judged like the file, and named in the sentence") {
           "nearest is 'tolerance'");
   refused("object.material.poisson=0.5", "object.cube.material.poisson is 0.5");
   refused("solver.method=newtn", "solver.method is 'newtn', nearest is 'newton'");
+  refused("resolution=0", "--set resolution=0: resolution is 0: it must be above 0");
+  refused("resolution=-1", "resolution is -1: it must be above 0 and at most 1000");
+  refused("object.cube.copies.count=[2,1,1]", "object.cube.copies lacks the key 'step'");
   refused("time.step=fast", "time.step is text: it must be a number");
   refused("solver.safeguard=yes", "solver.safeguard is text: it must be true or false");
   refused("time.step", "there is no '='");
@@ -136,4 +139,60 @@ TEST_CASE("overrides are judged like the file, and named in the sentence") {
   refused("=1", "a part of the key is empty");
   refused("time.step.x=1", "time.step is a table: it must be a number");
   refused("name.x=1", "name is a table: it must be text");
+}
+
+TEST_CASE("the resolution of a scene is a factor for every shape, in steps that the shape has") {
+  auto const resolution = [](std::string const& shape, double factor) {
+    std::string const text =
+        replaced(plain_scene, "{ kind = \"box\", size = [1, 1, 1], resolution = 2 }", shape);
+    Scene const scene = load(text, {"resolution=" + std::to_string(factor)});
+    return std::get<ProceduralShape>(scene.objects[0].geometry).resolution;
+  };
+  std::string const ball = "{ kind = \"sphere\", radius = 1, resolution = 6 }";
+  CHECK(resolution(ball, 1) == 6);
+  CHECK(resolution(ball, 2) == 12);
+  CHECK(resolution(ball, 0.4) == 2);
+  CHECK(resolution(ball, 0.001) == 1);
+  std::string const letter = "{ kind = \"letter_e\", resolution = 18 }";
+  CHECK(resolution(letter, 1.5) == 27);
+  CHECK(resolution(letter, 1.2) == 18);
+  CHECK(resolution(letter, 0.1) == 9);
+  std::string const step =
+      "{ kind = \"boxes\", boxes = [[[0, 0, 0], [3, 1, 1]], [[0, 1, 0], [1, 2, 1]]], resolution = "
+      "3 }";
+  CHECK(resolution(step, 0.5) == 3);
+  CHECK(resolution(step, 3.2) == 9);
+  std::string const tet =
+      "{ kind = \"tets\", points = [[0,0,0], [1,0,0], [0,1,0], [0,0,1]], tets = [[0,1,2,3]] }";
+  CHECK(resolution(tet, 3) == 3);
+
+  // Of obstacles too, in files and their small versions, and by itself in no scene of files.
+  std::string const bowl = two_objects +
+                           "[[obstacle]]\nname = \"bowl\"\nshape = { kind = \"bowl\", radius = 1, "
+                           "thickness = 0.1, height = 1, resolution = 5 }\n";
+  Scene const scene = load(bowl, {"resolution=3"}, true);
+  CHECK(scene.resolution == 3);
+  CHECK(std::get<ProceduralShape>(scene.objects[1].geometry).resolution == 3);
+  CHECK(std::get<ProceduralShape>(scene.obstacles[0].geometry).resolution == 15);
+  CHECK(load("resolution = 2\n" + plain_scene, {}).resolution == 2);
+  CHECK(scene.warnings.empty());
+  ScratchFolder const folder;
+  folder.write("body.msh", "");
+  auto const file = folder.write(
+      "scene.toml",
+      replaced(plain_scene, "shape = { kind = \"box\", size = [1, 1, 1], resolution = 2 }",
+               "mesh = \"body.msh\""));
+  CHECK(load_scene(file).warnings.empty());
+  auto const warned = load_scene(file, {.small = false, .overrides = {"resolution=2"}}).warnings;
+  REQUIRE(warned.size() == 1);
+  CHECK_THAT(warned[0], ContainsSubstring("resolution = 2 changes nothing"));
+}
+
+TEST_CASE("a change to the name of copies reaches all of them") {
+  std::string const text =
+      replaced(plain_scene, "name = \"cube\"",
+               "name = \"cube\"\ncopies = { count = [2, 2, 1], step = [2, 2, 2] }");
+  Scene const scene = load(text, {"object.cube.material.young=7"});
+  REQUIRE(scene.objects.size() == 4);
+  for (SceneObject const& object : scene.objects) CHECK(object.material.young == 7);
 }

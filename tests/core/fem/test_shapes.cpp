@@ -145,6 +145,21 @@ BoxUnionShape const ring{{{{{0, 0, 0}, {3, 1, 1}}},
                           {{{0, 0, 0}, {1, 3, 1}}},
                           {{{2, 0, 0}, {3, 3, 1}}}}};
 
+/// A pyramid on a square; the second tet names its vertices in another order than the first.
+TetMesh const two_tets{{{0, 0, 0}, {1, 0, 0}, {1, 0, 1}, {0, 0, 1}, {0.5, 3, 0.5}},
+                       {{0, 2, 1, 4}, {3, 2, 0, 4}}};
+
+/// By the divergence theorem: positive if the surface is oriented outward.
+double volume(TriangleMesh const& surface) {
+  double sum = 0;
+  for (auto const& [a, b, c] : surface.triangles)
+    sum += dot(surface.points.at(static_cast<std::size_t>(a)),
+               cross(surface.points.at(static_cast<std::size_t>(b)),
+                     surface.points.at(static_cast<std::size_t>(c)))) /
+           6;
+  return sum;
+}
+
 }  // namespace
 
 TEST_CASE("every shape is a valid mesh with a closed manifold boundary of its genus") {
@@ -156,11 +171,24 @@ TEST_CASE("every shape is a valid mesh with a closed manifold boundary of its ge
       Case{"coarsest cylinder", CylinderShape{0.5, 1, 2}, 1, 2},
       Case{"rod", CylinderShape{0.02, 1, 0}, 3, 2}, Case{"coarsest sphere", SphereShape{}, 1, 2},
       Case{"sphere", SphereShape{}, 7, 2}, Case{"coarsest torus", TorusShape{0.5, 0.49}, 1, 0},
-      Case{"torus", TorusShape{}, 5, 0});
+      Case{"torus", TorusShape{}, 5, 0}, Case{"coarsest bowl", BowlShape{}, 1, 2},
+      Case{"bowl", BowlShape{}, 12, 2},
+      Case{"thick, nearly closed bowl", BowlShape{1, 0.4, 1.8}, 9, 2},
+      Case{"coarsest funnel", FunnelShape{}, 1, 0}, Case{"funnel", FunnelShape{}, 9, 0},
+      Case{"flat funnel", FunnelShape{1, 0.1, 0.05, 0.3, 0.2}, 8, 0},
+      Case{"tets", TetsShape{two_tets}, 1, 2}, Case{"finer tets", TetsShape{two_tets}, 4, 2});
   INFO(name);
   TetMesh const mesh = make_shape(shape, resolution);
   require_valid(mesh);
   CHECK(boundary_characteristic(mesh) == characteristic);
+
+  // Its surface alone: the boundary's triangles, oriented outward, with no vertex beside them.
+  TriangleMesh const surface = boundary_surface(mesh);
+  CHECK(surface.triangles.size() == boundary_faces(mesh.tets).size());
+  CHECK_THAT(volume(surface), WithinRel(volume(mesh), 1e-12));
+  std::set<std::int32_t> used;
+  for (Triangle const& triangle : surface.triangles) used.insert(triangle.begin(), triangle.end());
+  CHECK(used.size() == surface.points.size());
 }
 
 TEST_CASE("a cube of 20 cells is the paper's cube_40: 19661 vertices, 100800 tets") {
@@ -193,13 +221,66 @@ TEST_CASE("round shapes approach their volume at second order, from inside") {
       std::tuple<std::string, Shape, double>{"sphere", SphereShape{0.7}, 4 * pi * 0.343 / 3},
       std::tuple<std::string, Shape, double>{"cylinder", CylinderShape{0.5, 1, 1}, pi / 4},
       std::tuple<std::string, Shape, double>{"torus", TorusShape{0.5, 0.2},
-                                             2 * pi * pi * 0.5 * 0.04});
+                                             2 * pi * pi * 0.5 * 0.04},
+      std::tuple<std::string, Shape, double>{"hemispherical bowl", BowlShape{0.5, 0.1, 0.5},
+                                             2 * pi / 3 * (0.216 - 0.125)},
+      std::tuple<std::string, Shape, double>{"shallow bowl", BowlShape{0.5, 0.1, 0.25},
+                                             2 * pi / 3 * 0.5 * (0.216 - 0.125)});
   INFO(name);
   double const coarse = exact - volume(make_shape(shape, 8));
   double const fine = exact - volume(make_shape(shape, 16));
   CHECK(fine > 0);
   CHECK(fine < 0.01 * exact);
   CHECK_THAT(std::log2(coarse / fine), WithinAbs(2.0, 0.05));
+}
+
+TEST_CASE("a bowl lies between its two balls, below its rim") {
+  double const height = GENERATE(0.1, 0.5, 0.9);
+  TetMesh const mesh = make_shape(BowlShape{0.5, 0.1, height}, 7);
+  double top = -1, least = 1, most = 0;
+  for (Point const& x : mesh.points) {
+    double const distance = std::sqrt(dot(x, x));
+    least = std::min(least, distance);
+    most = std::max(most, distance);
+    top = std::max(top, x[1] / distance);
+  }
+  CHECK_THAT(least, WithinAbs(0.5, 1e-12));
+  CHECK_THAT(most, WithinAbs(0.6, 1e-12));
+  CHECK_THAT(0.5 * top, WithinAbs(height - 0.5, 1e-12));
+}
+
+TEST_CASE("a funnel's wall is as thick as asked and turns around its axis") {
+  FunnelShape const funnel{0.5, 0.15, 0.4, 0.2, 0.05};
+  auto const wall = [&](int resolution) { return volume(make_shape(funnel, resolution)); };
+  // Pappus: the cross-section, cut into triangles, times the ways of their centroids.
+  double const slant = std::hypot(0.35, 0.4), mitre = 0.05 * 0.35 / (slant + 0.4);
+  std::array<std::array<double, 2>, 6> const ring{
+      {{0.15, -0.2},
+       {0.2, -0.2},
+       {0.2, -mitre},
+       {0.5 + 0.05 * 0.4 / slant, 0.4 - 0.05 * 0.35 / slant},
+       {0.5, 0.4},
+       {0.15, 0}}};
+  double exact = 0;
+  for (std::size_t k = 0; k < 6; ++k) {
+    auto const &a = ring[k], &b = ring[(k + 1) % 6];
+    exact += std::numbers::pi / 3 * (a[0] * b[1] - b[0] * a[1]) * (a[0] + b[0]);
+  }
+  double const coarse = exact - wall(16), fine = exact - wall(32);
+  CHECK(fine > 0);
+  CHECK(fine < 0.01 * exact);
+  CHECK_THAT(std::log2(coarse / fine), WithinAbs(2.0, 0.15));
+
+  // Both walls of the cone are the mitre's distance apart, and the tube is open.
+  for (Point const& x : make_shape(funnel, 8).points) {
+    double const r = std::hypot(x[0], x[2]);
+    double const from_cone = ((r - 0.15) * 0.4 - x[1] * 0.35) / slant;
+    CHECK(r > 0.1499);
+    if (x[1] > 0) {
+      CHECK(from_cone > -1e-12);
+      CHECK(from_cone < 0.05 + 1e-12);
+    }
+  }
 }
 
 TEST_CASE("tets keep their shape under refinement") {
@@ -210,6 +291,12 @@ TEST_CASE("tets keep their shape under refinement") {
   CHECK(smallest_angle(make_shape(SphereShape{}, resolution)) > 26);
   CHECK(smallest_angle(make_shape(CylinderShape{}, resolution)) > 33);
   CHECK(smallest_angle(make_shape(TorusShape{}, resolution)) > 24);
+  for (auto const& [thickness, angle] : {std::pair{0.3, 8.0}, {0.1, 7.0}, {0.02, 3.0}}) {
+    INFO("thickness " << thickness);
+    CHECK(smallest_angle(make_shape(BowlShape{0.5, thickness, 0.5}, resolution)) > angle);
+    CHECK(smallest_angle(make_shape(FunnelShape{0.5, 0.15, 0.5, 0.4, thickness}, resolution)) >
+          angle);
+  }
 }
 
 TEST_CASE("meshes have the symmetries of their shapes") {
@@ -254,4 +341,21 @@ TEST_CASE("shapes that cannot be meshed are refused with a sentence") {
   refused(CylinderShape{0.5, 1, 3}, 4, "0, 1 or 2");
   refused(SphereShape{0}, 4, "radius");
   refused(TorusShape{0.2, 0.2}, 4, "smaller");
+  refused(BowlShape{0.5, 0, 0.5}, 4, "thickness");
+  refused(BowlShape{0.5, 0.1, 0.95}, 4, "closed above 1.8 radii");
+  refused(FunnelShape{0.5, 0.5, 0.5, 0.2, 0.05}, 4, "throat must be the smaller");
+  refused(FunnelShape{0.5, 0.2, 0.5, 0.05, 0.05}, 4, "spout must be the longer");
+  refused(FunnelShape{0.5, 0.2, 0.5, 0.2, 0.05}, 100000, "lower its resolution");
+  refused(TetsShape{{{{0, 0, 0}}, {{0, 0, 0, 1}}}}, 1, "names vertex 1, but there are 1");
+  refused(TetsShape{two_tets}, 1000, "lower its resolution");
+  refused(TetsShape{two_tets}, 0, "at least 1");
+}
+
+TEST_CASE("a shape says what its resolution is a multiple of") {
+  CHECK(resolution_unit(BoxShape{}) == 1);
+  CHECK(resolution_unit(LetterEShape{}) == 9);
+  CHECK(resolution_unit(ring) == 3);
+  CHECK(resolution_unit(BoxUnionShape{{{{{0, 0, 0}, {1, std::sqrt(2.0), 1}}}}}) == 1);
+  CHECK(resolution_unit(BoxUnionShape{}) == 1);
+  CHECK(resolution_unit(TetsShape{two_tets}) == 1);
 }
