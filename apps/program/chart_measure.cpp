@@ -89,7 +89,7 @@ double StepMeasure::energy_above(std::vector<Point> const& x) const {
     strain += ElasticModels::with(
         part.model, [&]<class Model>() { return strain_energy_above<Model>(part, x); });
   }
-  for (std::size_t i = 0; i < x.size(); ++i)
+  for (std::size_t i = 0; i < mass_.size(); ++i)  // behind these, obstacles
     for (int c = 0; c < 3; ++c)
       inertia += 0.5 * mass_[i] * (x[i][c] - solution_[i][c]) * (x[i][c] - solution_[i][c]);
   return inertia + scale_ * strain;

@@ -25,6 +25,7 @@ struct ContactPart {
   Unknowns<P> unknowns;
   Surface surface;
   std::vector<Point> rest;  ///< m
+  double dhat;              ///< m
 };
 
 /// Adds the term that the options ask for. Throws Error for policies that are not compiled together

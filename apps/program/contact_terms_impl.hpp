@@ -21,11 +21,11 @@ std::shared_ptr<ProgramContact<P> const> add_contact_of(AnySteppedTerms<P>& term
     double dhat() const override { return term.dhat(); }
   };
   typename Term::Params params;
-  if (options.number("dhat") > 0) params.dhat = options.number("dhat");
+  params.dhat = part.dhat;
   params.cap = options.number("cap");
   params.stiffness = AnyStiffness(options);
   if constexpr (std::same_as<Bound, HalfDhatClamp>) {
-    params.bound.dhat = params.dhat.value_or(Term::default_dhat(part.surface, part.rest));
+    params.bound.dhat = part.dhat;
   }
   Term const term(part.unknowns, part.surface, part.rest, params);
   terms.add(term);

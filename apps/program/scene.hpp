@@ -77,17 +77,17 @@ struct SceneObject {
 };
 
 /// What bodies touch, in a frame of its own: half of space, or a convex region that keeps them in.
-struct HalfSpace {
+struct HalfSpaceShape {
   Point point{};          ///< m, on its plane
   Point normal{0, 1, 0};  ///< unit vector, to where bodies are
 };
-struct InsideBox {
+struct InsideBoxShape {
   Point size;  ///< m, centred on the origin
 };
-struct InsideSphere {
+struct InsideSphereShape {
   double radius;  ///< m, centred on the origin
 };
-struct InsideCylinder {
+struct InsideCylinderShape {
   double radius;  ///< m
   double height;  ///< m, along y, centred on the origin
 };
@@ -97,7 +97,7 @@ struct InsideCylinder {
 struct SceneObstacle {
   std::string where;
   std::string name;
-  std::variant<HalfSpace, InsideBox, InsideSphere, InsideCylinder, ProceduralShape,
+  std::variant<HalfSpaceShape, InsideBoxShape, InsideSphereShape, InsideCylinderShape, ProceduralShape,
                std::filesystem::path>
       geometry;                    ///< analytic ones are scaled already
   double scale = 1;                ///< of surfaces, before `placement`

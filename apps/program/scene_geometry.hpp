@@ -39,10 +39,11 @@ struct Force {
   Window window;
 };
 
-/// An obstacle that is a surface of triangles.
+/// The surface of an obstacle.
 struct ObstacleSurface {
-  std::size_t obstacle;  ///< index into Scene::obstacles, which has its motion
-  TriangleMesh mesh;     ///< at time 0, placed in the scene; closed ones oriented outward
+  std::size_t obstacle;     ///< index into Scene::obstacles, which has its motion
+  TriangleMesh mesh;        ///< at time 0, placed in the scene; closed ones oriented outward
+  bool drawn_only = false;  ///< for pictures: the obstacle is a formula
 };
 
 struct SceneGeometry {

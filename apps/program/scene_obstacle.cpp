@@ -108,7 +108,7 @@ struct Draw {
   std::array<Point, 2> const& around;
   int resolution;
 
-  TriangleMesh operator()(HalfSpace const& half) const {
+  TriangleMesh operator()(HalfSpaceShape const& half) const {
     RigidMap turn = obstacle.placement;
     turn.translation = {};
     Point const normal = turn(half.normal), on_plane = obstacle.placement(half.point);
@@ -130,13 +130,13 @@ struct Draw {
       }
     return mesh;
   }
-  TriangleMesh operator()(InsideBox const& box) const {
+  TriangleMesh operator()(InsideBoxShape const& box) const {
     return wall(BoxShape{box.size}, resolution, obstacle.placement);
   }
-  TriangleMesh operator()(InsideSphere const& sphere) const {
+  TriangleMesh operator()(InsideSphereShape const& sphere) const {
     return wall(SphereShape{sphere.radius}, resolution, obstacle.placement);
   }
-  TriangleMesh operator()(InsideCylinder const& cylinder) const {
+  TriangleMesh operator()(InsideCylinderShape const& cylinder) const {
     return wall(CylinderShape{cylinder.radius, cylinder.height, 1}, resolution, obstacle.placement);
   }
   template <class Surface>

@@ -26,14 +26,14 @@ Geometry read_inside(Section const& shape, std::string const& kind, double scale
                     shape.path("size"), edge, length_range.describe());
       edge *= scale;
     }
-    return InsideBox{size};
+    return InsideBoxShape{size};
   }
   if (kind == "sphere") {
     shape.allow({"kind", "inside", "radius"});
-    return InsideSphere{length("radius")};
+    return InsideSphereShape{length("radius")};
   }
   shape.allow({"kind", "inside", "radius", "height"});
-  return InsideCylinder{length("radius"), length("height")};
+  return InsideCylinderShape{length("radius"), length("height")};
 }
 
 /// In the frame of the obstacle.
@@ -43,8 +43,8 @@ Geometry read_geometry(Section const& shape, SceneObstacle const& obstacle, Scen
   std::string const kind = is_text ? std::get<std::string>(kind_value->value) : "";
   if (kind == "half_space") {
     shape.allow({"kind", "point", "normal"});
-    return HalfSpace{obstacle.scale * shape.point("point", "m", Point{}),
-                     shape.direction("normal", HalfSpace{}.normal)};
+    return HalfSpaceShape{obstacle.scale * shape.point("point", "m", Point{}),
+                     shape.direction("normal", HalfSpaceShape{}.normal)};
   }
   if (!shape.flag("inside", false)) return read_shape(shape, scene.resolution, ShapeOf::obstacle);
   return read_inside(shape, shape.choice("kind", hollow_kinds), obstacle.scale);

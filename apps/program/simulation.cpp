@@ -10,6 +10,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <numeric>
 
 namespace taut {
 
@@ -46,8 +47,9 @@ public:
   SimulationOf(Scene const& scene, SceneGeometry const& geometry)
       : scene_(scene),
         geometry_(geometry),
-        order_(locality_order(geometry.mesh, geometry.material_of_tet)),
-        lumped_(lumped_mass(geometry.mesh, density_per_tet(geometry))),
+        mesh_(with_obstacles(geometry)),
+        order_(locality_order(mesh_, geometry.material_of_tet)),
+        lumped_(masses()),
         potential_(make_potential()),
         state_(size()),
         forces_("forces", size()),
@@ -56,8 +58,8 @@ public:
         euler_(scene.solver),
         bdf2_(scene.solver),
         static_(scene.solver) {
-    write(state_.x, geometry.start);
-    write(state_.v, geometry.velocity);
+    write(state_.x, geometry.start, mesh_.points);
+    write(state_.v, geometry.velocity, std::vector<Point>(size()));
     refuse_forbidden_inversion();
   }
 
@@ -67,7 +69,8 @@ public:
     Observer<P, DefaultSpace> inner;
     if (observer) {
       inner = [&](Iteration<P, DefaultSpace> const& i) {
-        observer({i.index, i.energy_change_so_far, i.error_estimate, [&] { return read(i.x); }});
+        observer({i.index, i.energy_change_so_far, i.error_estimate,
+                  [&] { return arranged(read(i.x), true); }});
       };
     }
     NewtonReport const report = advance_or_say(h, inner);
@@ -91,8 +94,8 @@ public:
     if (!contact_) return {};
     return contact_->report(state_.x);
   }
-  std::vector<Point> positions() const override { return read(state_.x); }
-  std::vector<Point> velocities() const override { return read(state_.v); }
+  std::vector<Point> positions() const override { return arranged(read(state_.x), true); }
+  std::vector<Point> velocities() const override { return arranged(read(state_.v), false); }
 
   void save(Checkpoint& checkpoint) const override {
     checkpoint.set("time", std::vector<double>{state_.time});
@@ -119,14 +122,40 @@ public:
   }
 
 private:
-  int size() const { return static_cast<int>(geometry_.mesh.points.size()); }
+  /// Of bodies and of the surfaces of obstacles.
+  int size() const { return static_cast<int>(mesh_.points.size()); }
 
-  static std::vector<double> density_per_tet(SceneGeometry const& geometry) {
-    std::vector<double> density;
-    for (std::int32_t m : geometry.material_of_tet) {
-      density.push_back(geometry.materials[m].density);
+  /// The bodies, and the vertices of obstacles that are surfaces: vertices without a tet.
+  static TetMesh with_obstacles(SceneGeometry const& geometry) {
+    TetMesh all = geometry.mesh;
+    for (ObstacleSurface const& surface : geometry.obstacle_meshes) {
+      if (surface.drawn_only) continue;
+      all.points.insert(all.points.end(), surface.mesh.points.begin(), surface.mesh.points.end());
     }
-    return density;
+    return all;
+  }
+  /// Calls visit(surface, index of its first vertex in mesh_) for those that things collide with.
+  template <class Visit>
+  void for_each_surface(Visit const& visit) const {
+    std::size_t first = geometry_.mesh.points.size();
+    for (ObstacleSurface const& surface : geometry_.obstacle_meshes) {
+      if (surface.drawn_only) continue;
+      visit(surface, static_cast<std::int32_t>(first));
+      first += surface.mesh.points.size();
+    }
+  }
+
+  /// kg, in the order of mesh_. An obstacle never moves freely, so that any mass will do.
+  std::vector<double> masses() const {
+    std::vector<double> density;
+    for (std::int32_t m : geometry_.material_of_tet) {
+      density.push_back(geometry_.materials[m].density);
+    }
+    std::vector<double> mass = lumped_mass(mesh_, density);
+    std::size_t const bodies = geometry_.mesh.points.size();
+    double const total = std::accumulate(mass.begin(), mass.end(), 0.0);
+    std::fill(mass.begin() + bodies, mass.end(), total / double(bodies));
+    return mass;
   }
 
   ProgramPotential<P> make_potential() {
@@ -156,19 +185,38 @@ private:
 
   void add_contact(AnySteppedTerms<P, DefaultSpace>& terms, Unknowns<P> const& unknowns) {
     std::vector<Triangle> triangles = boundary_faces(geometry_.mesh.tets);
+    double const dhat = distance_of_contact(triangles);
+    for_each_surface([&](ObstacleSurface const& surface, std::int32_t first) {
+      for (Triangle const& t : surface.mesh.triangles) {
+        triangles.push_back({t[0] + first, t[1] + first, t[2] + first});
+      }
+    });
     for (Triangle& t : triangles)
       for (auto& v : t) v = order_.new_vertex[v];
     std::vector<int> object(size());
+    for_each_surface([&](ObstacleSurface const& surface, std::int32_t first) {
+      for (std::size_t v = 0; v < surface.mesh.points.size(); ++v) {
+        object[order_.new_vertex[first + v]] =
+            static_cast<int>(geometry_.objects.size() + surface.obstacle);
+      }
+    });
     for (std::size_t k = 0; k < geometry_.objects.size(); ++k) {
       ObjectPart const& part = geometry_.objects[k];
       for (int v = 0; v < part.vertices; ++v) {
         object[order_.new_vertex[part.first_vertex + v]] = static_cast<int>(k);
       }
     }
-    ContactPart<P> part{unknowns, make_surface(std::move(triangles), std::move(object)), {}};
-    for (std::int32_t v : order_.vertices) part.rest.push_back(geometry_.mesh.points[v]);
+    ContactPart<P> part{unknowns, make_surface(std::move(triangles), std::move(object)), {}, dhat};
+    for (std::int32_t v : order_.vertices) part.rest.push_back(mesh_.points[v]);
     contact_ = add_contact_term<P>(terms, part, *scene_.contact);
     for (ObjectPart const& body : geometry_.objects) refuse_small(body, contact_->dhat());
+  }
+  /// By default a share of the edges of the bodies, however coarse the obstacles are.
+  double distance_of_contact(std::vector<Triangle> const& bodies) const {
+    double const given = scene_.contact->number("dhat");
+    if (given > 0) return given;
+    Surface const surface = make_surface(bodies, std::vector<int>(size()));
+    return Contact<>::default_dhat(surface, mesh_.points);
   }
   /// A body that is nowhere further from another side of itself than dhat.
   void refuse_small(ObjectPart const& body, double dhat) const {
@@ -190,7 +238,7 @@ private:
 
   ElasticPart part_of(std::string const& model) const {
     ElasticPart part;
-    for (std::int32_t v : order_.vertices) part.rest.points.push_back(geometry_.mesh.points[v]);
+    for (std::int32_t v : order_.vertices) part.rest.points.push_back(mesh_.points[v]);
     for (MaterialParameters const& m : geometry_.materials) {
       part.materials.push_back(lame_parameters(m.young, m.poisson));
     }
@@ -220,27 +268,40 @@ private:
     }
   }
 
-  /// Each pin has a mark of its own, as long as there are any left: pins of one mark are not kept
-  /// apart. Marks depend on the order of the pins alone, be they held or not.
-  static std::uint8_t mark_after(std::uint8_t mark) {
-    return mark < std::numeric_limits<std::uint8_t>::max() ? mark + 1 : mark;
-  }
+  /// What never moves has one mark. Every other pin and obstacle has one of its own, as long as
+  /// there are any left: those of one mark are not kept apart.
+  class Marks {
+  public:
+    std::uint8_t next(RigidMotion const& motion) {
+      if (motion.phases.empty()) return 1;
+      if (last_ < std::numeric_limits<std::uint8_t>::max()) ++last_;
+      return last_;
+    }
+
+  private:
+    std::uint8_t last_ = 1;
+  };
 
   /// Pins and forces of the step that ends at time t.
   void prescribe(double t, double h) {
     Kokkos::deep_copy(fixed_, std::uint8_t(0));
-    std::uint8_t mark = 0;
+    Marks marks;
     for (Pin const& pin : geometry_.pins) {
-      mark = mark_after(mark);
+      std::uint8_t const mark = marks.next(pin.motion);
       if (!pin.window.covers_step(t, h)) continue;
       RigidMap const map = pin.motion.at(t);
       for (std::int32_t v : pin.vertices) {
-        int const i = order_.new_vertex[v];
-        Point const to = map(geometry_.mesh.points[v]);
-        fixed_(i) = mark;
-        for (int c = 0; c < 3; ++c) prescribed_(i, c) = static_cast<Position>(to[c]);
+        prescribe_vertex(order_.new_vertex[v], map(geometry_.mesh.points[v]), mark);
       }
     }
+    for_each_surface([&](ObstacleSurface const& surface, std::int32_t first) {
+      RigidMotion const& motion = scene_.obstacles[surface.obstacle].motion;
+      std::uint8_t const mark = marks.next(motion);
+      RigidMap const map = motion.at(t);
+      for (std::size_t v = 0; v < surface.mesh.points.size(); ++v) {
+        prescribe_vertex(order_.new_vertex[first + v], map(surface.mesh.points[v]), mark);
+      }
+    });
     Kokkos::deep_copy(potential_.unknowns().fixed, fixed_);
     Kokkos::deep_copy(potential_.unknowns().prescribed, prescribed_);
 
@@ -263,6 +324,16 @@ private:
     potential_.template term<BodyForce<P>>().set_forces(any ? forces_ : Vectors());
   }
 
+  void prescribe_vertex(int i, Point const& to, std::uint8_t mark) {
+    fixed_(i) = mark;
+    for (int c = 0; c < 3; ++c) prescribed_(i, c) = static_cast<Position>(to[c]);
+  }
+
+  /// Where space around an obstacle that is a formula has been brought since time 0.
+  RigidMap place_of(std::size_t obstacle) const {
+    return scene_.obstacles[obstacle].motion.at(state_.time);
+  }
+
   /// Names what holds up pins.
   NewtonReport advance_or_say(double h, Observer<P, DefaultSpace> const& observer) {
     try {
@@ -271,6 +342,9 @@ private:
       std::vector<std::string> pins;
       for (Pin const& pin : geometry_.pins) {
         if (pin.window.covers_step(state_.time + h, h)) pins.push_back(pin.name);
+      }
+      for (SceneObstacle const& obstacle : scene_.obstacles) {
+        if (!obstacle.motion.phases.empty()) pins.push_back(obstacle.name);
       }
       auto const& unknowns = held.by().unknowns;
       throw Error(
@@ -290,12 +364,23 @@ private:
         int const v = order_.vertices[i] - body.first_vertex;
         if (v >= 0 && v < body.vertices) inside.push_back(v);
       }
-      if (inside.empty()) continue;
-      text += fmt::format("{}{} {} of {}", text.empty() ? "" : ", ",
-                          inside.size() == 1 ? "vertex" : "vertices", fmt::join(inside, ", "),
-                          body.name);
+      add_vertices(text, inside, body.name);
     }
+    for_each_surface([&](ObstacleSurface const& surface, std::int32_t first) {
+      std::vector<int> inside;
+      for (int i : unknowns) {
+        int const v = order_.vertices[i] - first;
+        if (v >= 0 && v < int(surface.mesh.points.size())) inside.push_back(v);
+      }
+      add_vertices(text, inside, scene_.obstacles[surface.obstacle].name);
+    });
     return text;
+  }
+  static void add_vertices(std::string& text, std::vector<int> const& inside,
+                           std::string const& owner) {
+    if (inside.empty()) return;
+    text += fmt::format("{}{} {} of {}", text.empty() ? "" : ", ",
+                        inside.size() == 1 ? "vertex" : "vertices", fmt::join(inside, ", "), owner);
   }
 
   NewtonReport advance(double h, Observer<P, DefaultSpace> const& observer) {
@@ -315,10 +400,11 @@ private:
   }
 
   template <class Field>
-  void write(Field const& field, std::vector<Point> const& from) const {
+  void write(Field const& field, std::vector<Point> const& bodies, std::vector<Point> all) const {
+    std::copy(bodies.begin(), bodies.end(), all.begin());  // behind them, obstacles
     auto const host = Kokkos::create_mirror_view(field);
     for (int i = 0; i < size(); ++i)
-      for (int c = 0; c < 3; ++c) host(i, c) = static_cast<Position>(from[order_.vertices[i]][c]);
+      for (int c = 0; c < 3; ++c) host(i, c) = static_cast<Position>(all[order_.vertices[i]][c]);
     Kokkos::deep_copy(field, host);
   }
   std::vector<Point> read(Positions const& field) const {
@@ -326,6 +412,24 @@ private:
     std::vector<Point> to(size());
     for (int i = 0; i < size(); ++i)
       for (int c = 0; c < 3; ++c) to[order_.vertices[i]][c] = host(i, c);
+    return to;
+  }
+  /// From the order of mesh_ to that of the scene's obstacles: puts those that are drawn only among
+  /// the others, at their `places` or with zeros.
+  std::vector<Point> arranged(std::vector<Point> const& all, bool places) const {
+    auto next = all.begin() + std::ssize(geometry_.mesh.points);
+    std::vector<Point> to(all.begin(), next);
+    for (ObstacleSurface const& surface : geometry_.obstacle_meshes) {
+      auto const count = std::ssize(surface.mesh.points);
+      if (surface.drawn_only) {
+        for (Point const& x : surface.mesh.points) {
+          to.push_back(places ? place_of(surface.obstacle)(x) : Point{});
+        }
+      } else {
+        to.insert(to.end(), next, next + count);
+        next += count;
+      }
+    }
     return to;
   }
   std::vector<Position> flat(Positions const& field) const {
@@ -340,8 +444,9 @@ private:
   }
   Scene scene_;
   SceneGeometry geometry_;
+  TetMesh mesh_;  ///< of the scene, with the vertices of obstacles
   Ordering order_;
-  std::vector<double> lumped_;                        ///< in the mesh's order
+  std::vector<double> lumped_;                        ///< kg, in the order of mesh_
   std::shared_ptr<ProgramContact<P> const> contact_;  ///< null: nothing keeps bodies apart
   ProgramPotential<P> potential_;
   State<P> state_;

@@ -40,6 +40,7 @@ public:
   virtual int steps() const = 0;
   /// What contact amounts to now; nothing in a scene without.
   virtual std::optional<ContactReport> contact() const = 0;
+  /// Of the scene's mesh, and behind it of the surfaces of obstacles (SceneGeometry).
   virtual std::vector<Point> positions() const = 0;   ///< m
   virtual std::vector<Point> velocities() const = 0;  ///< m/s
 

@@ -91,7 +91,7 @@ std::vector<std::string> collisions(Scene const& scene, SceneGeometry const& geo
        IntersectionTest({triangles, edges_of(triangles), body}).find(points))
     found.push_back(i.text(names));
   for (SceneObstacle const& obstacle : scene.obstacles) {
-    auto const* half = std::get_if<HalfSpace>(&obstacle.geometry);
+    auto const* half = std::get_if<HalfSpaceShape>(&obstacle.geometry);
     if (half == nullptr) continue;
     Point const on_plane = obstacle.placement(half->point);
     Point const normal = obstacle.placement(half->point + half->normal) - on_plane;
@@ -301,7 +301,7 @@ TEST_CASE("the walls of the squeeze close in from all six sides and open again")
   auto const box = [&](double t) {
     Point sum{};
     for (SceneObstacle const& wall : scene.obstacles) {
-      auto const& half = std::get<HalfSpace>(wall.geometry);
+      auto const& half = std::get<HalfSpaceShape>(wall.geometry);
       sum = sum +
             -dot(half.normal, wall.motion.at(t)(half.point)) *
                 Point{std::abs(half.normal[0]), std::abs(half.normal[1]), std::abs(half.normal[2])};

@@ -153,19 +153,19 @@ rotate = { axis = [0, 0, 1], angle = 90 })");
   SceneObstacle const& floor = scene.obstacles[0];
   CHECK(floor.name == "thing");
   CHECK_THAT(floor.where, ContainsSubstring("scene.toml:17: obstacle.thing"));
-  CHECK(std::get<HalfSpace>(floor.geometry).point == Point{0, -6, 0});
-  CHECK(std::get<HalfSpace>(floor.geometry).normal == Point{0, 1, 0});
+  CHECK(std::get<HalfSpaceShape>(floor.geometry).point == Point{0, -6, 0});
+  CHECK(std::get<HalfSpaceShape>(floor.geometry).normal == Point{0, 1, 0});
   CHECK(floor.friction == 0.5);
   CHECK_FALSE(floor.is_surface());
   SceneObstacle const& room = scene.obstacles[1];
-  CHECK(std::get<InsideBox>(room.geometry).size == Point{2, 4, 6});
+  CHECK(std::get<InsideBoxShape>(room.geometry).size == Point{2, 4, 6});
   CHECK(room.placement({1, 0, 0}) == Point{6, 0, 0});
   CHECK_FALSE(room.friction.has_value());
   SceneObstacle const& bubble = scene.obstacles[2];
-  CHECK(std::get<InsideSphere>(bubble.geometry).radius == 2);
+  CHECK(std::get<InsideSphereShape>(bubble.geometry).radius == 2);
   Point const moved = bubble.motion.at(4)({2, 0, 0});  // up by 2, then a quarter turn
   CHECK_THAT(norm(moved - Point{1, 2, -1}), WithinAbs(0, 1e-12));
-  CHECK(std::get<InsideCylinder>(scene.obstacles[3].geometry).height == 1);
+  CHECK(std::get<InsideCylinderShape>(scene.obstacles[3].geometry).height == 1);
   CHECK_THAT(norm(scene.obstacles[3].placement({0, 1, 0}) - Point{-1, 0, 0}), WithinAbs(0, 1e-12));
 }
 
