@@ -56,8 +56,10 @@ struct WithinReach {
   Activation<S> activation;
   Displacement reach;
 
-  KOKKOS_FUNCTION bool operator()(PairKind kind, int const (&v)[4],
-                                  Vec3<double> const (&y)[4]) const {
+  /// Compiled once, as what contact_kernels.hpp computes: which pairs are candidates must not
+  /// depend on the number of threads.
+  [[gnu::noinline]] KOKKOS_FUNCTION bool operator()(PairKind kind, int const (&v)[4],
+                                                    Vec3<double> const (&y)[4]) const {
     double const low = distance_below(kind, y);
     double const far = activation.one_body(v) ? reach.within : reach.between;
     if (!(low < activation.dhat + far)) return false;
@@ -83,15 +85,19 @@ struct LeastClearance {
   Array<float, S> distance;
   bool one_body;
   KOKKOS_FUNCTION void operator()(int k, double& least) const {
+    least = Kokkos::min(least, note(k, least));
+  }
+  /// Compiled once, as well. What is left, or `other` of a pair of the other sort.
+  [[gnu::noinline]] KOKKOS_FUNCTION double note(int k, double other) const {
     int v[4];
     read_pair(ids, k, v);
     bool const one = activation.one_body(v);
-    if (one != one_body) return;
+    if (one != one_body) return other;
     Vec3<double> y[4];
     gather(v, x, y);
     double const low = WithinReach<S>::distance_below(kind, y);
     distance(k) = pair_length(one, FoundDistances<S>::shaded(low, y));
-    least = Kokkos::min(least, low - activation(kind, v));
+    return low - activation(kind, v);
   }
 };
 

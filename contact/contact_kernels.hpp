@@ -416,13 +416,15 @@ struct LargestMotion {
   typename SurfaceViews<S>::Indices vertex;
   VectorField<typename Precision::real, S> p;
   KOKKOS_FUNCTION void operator()(int i, double& largest) const {
+    largest = Kokkos::max(largest, length(i));
+  }
+  [[gnu::noinline]] KOKKOS_FUNCTION double length(int i) const {
     int const v = vertex(i), o = vertex(0);
     Vec3<double> d;
     for (int c = 0; c < 3; ++c) d[c] = double(p(v, c)) - double(p(o, c));
-    double length = norm(d);
+    double const size = norm(d);
     // A maximum passes over what is not a number.
-    if (!(length >= 0)) length = Kokkos::Experimental::infinity_v<double>;
-    largest = Kokkos::max(largest, length);
+    return size >= 0 ? size : Kokkos::Experimental::infinity_v<double>;
   }
 };
 

@@ -59,7 +59,10 @@ struct ChunkBounds {
   Cloud cloud;
   Kokkos::View<int const*, typename S::memory> vertex, begin;
   Kokkos::View<Bounds*, typename S::memory> to;
-  KOKKOS_FUNCTION void operator()(int i) const {
+  KOKKOS_FUNCTION void operator()(int i) const { find(i); }
+  /// Compiled once, as what contact_kernels.hpp computes: a bound must not depend on the number of
+  /// threads.
+  [[gnu::noinline]] KOKKOS_FUNCTION void find(int i) const {
     Bounds b;
     FindBounds<int>{}.init(b);
     for (int k = begin(i); k < begin(i + 1); ++k) cloud.add(vertex(k), b);
@@ -67,7 +70,7 @@ struct ChunkBounds {
   }
 };
 
-KOKKOS_INLINE_FUNCTION double diagonal(Bounds const& b) {
+[[gnu::noinline]] KOKKOS_INLINE_FUNCTION double diagonal(Bounds const& b) {
   double sum = 0;
   for (int c = 0; c < 3; ++c) {
     double const side = b.high[c] - b.low[c];
