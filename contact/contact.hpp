@@ -11,6 +11,7 @@
 
 #include <taut/contact/candidate_cache.hpp>
 #include <taut/contact/contact_pairs.hpp>
+#include <taut/contact/lag_pairs.hpp>
 #include <taut/contact/spatial_hash.hpp>
 #include <taut/contact/step_bound_sweep.hpp>
 #include <taut/core/potential/term.hpp>
@@ -169,6 +170,14 @@ public:
   std::int64_t pattern_version(Positions const& x) const {
     state_->complete(x);
     return state_->near.counters().searches;
+  }
+
+  /// For friction: appends all pairs that act at x, with mu by the objects of the surface.
+  void lag(Positions const& x, kernels::FrictionMatrix<Space> const& mu,
+           LaggedContacts<Precision, Space>& to) const {
+    if (!state_->complete({x, {}, 0, state_->fixed})) return;
+    using Kernel = kernels::LagPair<Pair, Precision, Space>;
+    to.append("contact_lag", pairs().count, Kernel{pairs(), x, state_->surface.object, mu});
   }
 
   double dhat() const { return state_->activation.dhat; }

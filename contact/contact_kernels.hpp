@@ -10,6 +10,7 @@
 #include <taut/contact/broad_phase.hpp>
 #include <taut/contact/pair.hpp>
 #include <taut/contact/stiffness.hpp>
+#include <taut/contact/vertex_slots.hpp>
 
 #include <type_traits>
 
@@ -58,12 +59,6 @@ struct PairTable {
     for (int a = 0; a < 4; ++a)
       for (int c = 0; c < 3; ++c) step[a][c] = alpha * double(p(vertex(k, a), c));
   }
-};
-
-/// Which slots belong to which vertex.
-template <class S>
-struct SlotsOfVertices {
-  Kokkos::View<int*, typename S::memory> begin, slot;
 };
 
 /// Takes over the candidates of one kind as pairs `first`, `first` + 1, ...
@@ -288,36 +283,6 @@ struct PairProduct {
       to.acts(k) = 0;
     } else {
       multiply(k);
-    }
-  }
-};
-
-/// Adds the slots of surface vertex i, and `numbers` of curvature, times `scale`.
-template <class Precision, class S, class CurvatureField, int numbers>
-struct GatherSlots {
-  using Real = typename Precision::real;
-  typename SurfaceViews<S>::Indices vertex;
-  SlotsOfVertices<S> of;
-  ContactSlots<Precision, S> from;
-  FixedMask<S> fixed;
-  double scale;
-  VectorField<Real, S> g;
-  CurvatureField curvature;
-
-  KOKKOS_FUNCTION void operator()(int i) const { add(vertex(i)); }
-  [[gnu::noinline]] KOKKOS_FUNCTION void add(int v) const {
-    if (fixed(v)) return;
-    Vec3<double> sum{};
-    double h[6] = {};
-    for (int j = of.begin(v); j < of.begin(v + 1); ++j) {
-      int const slot = of.slot(j);
-      if (!from.acts(slot / 4)) continue;
-      for (int c = 0; c < 3; ++c) sum[c] += double(from.vector(slot, c));
-      for (int c = 0; c < numbers; ++c) h[c] += double(from.curvature(slot, c));
-    }
-    for (int c = 0; c < 3; ++c) g(v, c) += static_cast<Real>(scale * sum[c]);
-    if constexpr (numbers > 0) {
-      for (int c = 0; c < numbers; ++c) curvature(v, c) += static_cast<Real>(scale * h[c]);
     }
   }
 };

@@ -131,7 +131,7 @@ public:
   template <int numbers, class CurvatureField>
   void gather(Slots const& slots, double scale, FixedMask<S> const& fixed, Vectors const& g,
               CurvatureField const& curvature) const {
-    using Gather = kernels::GatherSlots<Precision, S, CurvatureField, numbers>;
+    using Gather = kernels::GatherSlots<Precision, S, Slots, CurvatureField, numbers>;
     for_each<S>("contact_gather", surface_.vertices(),
                 Gather{surface_.vertex, {begin_, slot_}, slots, fixed, scale, g, curvature});
   }

@@ -118,6 +118,12 @@ struct NewtonReport : MinimiserReport {
   int linear_failures = 0;    ///< steps along -P g, because the linear solver had found no descent
 };
 
+inline NewtonReport in_sequence(NewtonReport const& first, NewtonReport const& second) {
+  MinimiserReport const &a = first, &b = second;
+  return {in_sequence(a, b), first.linear_iterations + second.linear_iterations,
+          first.linear_failures + second.linear_failures};
+}
+
 /// The directions of Newton's method.
 template <class Linear, class P, class S>
 class NewtonDirections {

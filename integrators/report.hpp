@@ -76,6 +76,24 @@ struct MinimiserReport {
   }
 };
 
+/// Of two minimisations, one after the other, as one: it ended as the second did.
+inline MinimiserReport in_sequence(MinimiserReport const& first, MinimiserReport const& second) {
+  MinimiserReport r = second;
+  r.iterations += first.iterations;
+  r.restarts.not_descent += first.restarts.not_descent;
+  r.restarts.curvature += first.restarts.curvature;
+  r.restarts.cut += first.restarts.cut;
+  r.restarts.armijo += first.restarts.armijo;
+  r.restarts.prescribed += first.restarts.prescribed;
+  r.skipped_pairs += first.skipped_pairs;
+  r.backtracks += first.backtracks;
+  r.cuts += first.cuts;
+  r.refreshes += first.refreshes;
+  r.energy_change += first.energy_change;
+  r.seconds += first.seconds;
+  return r;
+}
+
 /// One step, as an observer sees it.
 template <class P, class S>
 struct Iteration {

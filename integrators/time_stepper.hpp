@@ -20,6 +20,7 @@
 #include <taut/core/exec/parallel.hpp>
 #include <taut/core/potential/local_terms.hpp>
 #include <taut/core/potential/objective.hpp>
+#include <taut/core/report/error.hpp>
 #include <taut/integrators/report.hpp>
 
 #include <cmath>
@@ -153,6 +154,13 @@ struct FinishStep {
 
 }  // namespace kernels
 
+/// What terms take from the start of a step instead of following x within it (the normal forces and
+/// tangent planes of friction) may be taken anew where the minimisation ended, and the step be
+/// minimised again: a fixed point, `passes` minimisations in all.
+struct Lagging {
+  int passes = 1;
+};
+
 template <class Rule, class Minimiser>
 class TimeStepper {
 public:
@@ -162,7 +170,13 @@ public:
   using Params = typename Minimiser::Params;
 
   TimeStepper() = default;
-  explicit TimeStepper(Params const& params) : minimiser_(params) {}
+  /// Throws Error unless there is at least one pass.
+  explicit TimeStepper(Params const& params, Lagging const& lagging = {})
+      : minimiser_(params), lagging_(lagging) {
+    if (lagging.passes < 1) {
+      throw Error("a time step of {} minimisations: give 1 pass or more", lagging.passes);
+    }
+  }
 
   /// Advances the state by h seconds and returns the minimiser's report. Pins go to
   /// potential.unknowns().prescribed, which the caller has set for the end of the step. The state
@@ -199,7 +213,11 @@ private:
                                                               r.a1, h * r.b0, h * r.b1});
     potential.predict(x_);
     start(potential, state);
-    auto const report = minimiser_.minimise(potential, x_, observer);
+    auto report = minimiser_.minimise(potential, x_, observer);
+    for (int pass = 1; pass < lagging_.passes && report.stop != Stop::non_finite; ++pass) {
+      if (!potential.relag(x_)) break;
+      report = in_sequence(report, minimiser_.minimise(potential, x_, observer));
+    }
     if (report.stop == Stop::non_finite) return report;
     for_each<Space>("finish_step", n,
                     kernels::FinishStep<Precision, Space>{state, x_, r.c / h, r.c0 / h, r.c1 / h});
@@ -228,6 +246,7 @@ private:
   }
 
   Minimiser minimiser_;
+  Lagging lagging_;
   Positions x_;
   VectorField<typename Precision::real, Space> direction_;
 };

@@ -95,6 +95,11 @@ public:
   void begin_step(StepStart<Precision, Space> const& start) const requires stepped {
     for (auto const& t : terms_) t->begin_step(start);
   }
+  bool relag(Positions const& x) const requires stepped {
+    bool changed = false;
+    for (auto const& t : terms_) changed = t->relag(x) || changed;
+    return changed;
+  }
   double motion_left(Positions const& x) const requires stepped {
     double left = 0;
     for (auto const& t : terms_) left = std::max(left, t->motion_left(x));
@@ -134,6 +139,7 @@ private:
     virtual std::int64_t pattern_version(Positions const&) const = 0;
     virtual std::optional<Obstruction> obstruction() const = 0;
     virtual void begin_step(StepStart<Precision, Space> const&) const = 0;
+    virtual bool relag(Positions const&) const = 0;
     virtual double motion_left(Positions const&) const = 0;
     virtual double max_advance(Positions const&, Vectors const&, double) const = 0;
     virtual void advance(double) const = 0;
@@ -199,6 +205,10 @@ private:
     }
     void begin_step(StepStart<Precision, Space> const& start) const override {
       if constexpr (SteppedTerm<Term>) term.begin_step(start);
+    }
+    bool relag(Positions const& x) const override {
+      if constexpr (LaggedTerm<Term>) return term.relag(x);
+      return false;
     }
     double motion_left(Positions const& x) const override {
       if constexpr (MovingTerm<Term>) return term.motion_left(x);

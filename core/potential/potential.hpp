@@ -274,6 +274,13 @@ public:
     }
   }
 
+  /// Takes anew, at x, what terms took where the step began; false if that changes nothing.
+  bool relag(Positions const& x) const {
+    bool changed = false;
+    for_each_of<is_lagged>([&](auto const& term) { changed = term.relag(x) || changed; });
+    return changed;
+  }
+
   template <class Term>
   Term& term() {
     return std::get<Term>(terms_);
@@ -452,6 +459,8 @@ private:
   using is_untold = std::bool_constant<SweptTerm<Term> && !SteppedTerm<Term>>;
   template <class Term>
   using is_changing = std::bool_constant<ChangingTerm<Term>>;
+  template <class Term>
+  using is_lagged = std::bool_constant<LaggedTerm<Term>>;
   template <class Term>
   using is_moving = std::bool_constant<MovingTerm<Term>>;
 

@@ -86,7 +86,7 @@ struct StepStart {
 };
 
 /// A term that is told when a step begins. It may then become another function of x, and must not
-/// within the step, unless `advance` (below) says so.
+/// within the step, unless `advance` or `relag` (below) says so.
 template <class Term>
 concept SteppedTerm = SweptTerm<Term> &&
     requires(Term const& term, StepStart<typename Term::Precision, typename Term::Space> start) {
@@ -116,6 +116,15 @@ concept MovingTerm = SweptTerm<Term> &&
   { term.max_advance(x, p, at_most) } -> std::convertible_to<double>;
   /// Goes by this fraction; by 1 it arrives.
   {term.advance(at_most)};
+};
+
+/// A term of which something was taken where the step began and stays so (the normal forces of
+/// friction). `relag` takes it at x instead; false if that changes nothing.
+template <class Term>
+concept LaggedTerm = SteppedTerm<Term> &&
+    requires(Term const& term,
+             VectorField<typename Term::Precision::position, typename Term::Space> x) {
+  { term.relag(x) } -> std::convertible_to<bool>;
 };
 
 /// A term that can say what its last max_step or max_prescribed_step was cut by.
