@@ -4,30 +4,23 @@
 //
 // which keeps bodies within a convex set (obstacle_shapes.hpp: why inside, and what else there is
 // to do), with the barriers of contact between bodies (barrier.hpp) and its rules of stiffness
-// (stiffness.hpp). As each face of a surface bears on it as a layer of thickness dhat and modulus
-// P, a body rests at a gap that depends on the load over P and dhat alone: not on the time step,
-// not on the mesh.
+// (stiffness.hpp). A surface that lies on it resists like a layer of thickness dhat, of modulus P
+// if that is given: then a body rests at a gap that depends on the load over P and on dhat alone,
+// not on the time step and not on the mesh.
 //
-// The obstacle may move. Within a step it goes from where it is to where it is told to be as pins
-// do, in portions, each as far as nothing is crossed:
-//
-//   obstacle.move_to(pose);                                       // where it is to be at the end
-//   while (obstacle.motion_left(x) > 0) {
-//     double const a = share * obstacle.max_advance(x, p, 1 / share);   // with bodies that go by p
-//     ...                                                         // x += min(a, 1) p
-//     obstacle.advance(a);                                        // the obstacle too
-//   }
-//
-// On the way it turns about the centre of its shape, by less than half a turn, while the centre
-// goes straight. An obstacle that does not move has no sweep of its own in any of this.
+// The obstacle may move (MovingTerm): move_to says where it is to be at the end of the step, and
+// within the step it goes there as prescribed unknowns do, in portions, each as far as nothing is
+// crossed. On the way its centre goes straight while it turns about the centre, by less than half a
+// turn. An obstacle that does not move has no sweep of its own in any of this.
 #pragma once
 
-#include <taut/contact/contact_pairs.hpp>
 #include <taut/contact/obstacle_kernels.hpp>
 
+#include <algorithm>
 #include <cmath>
 #include <memory>
 #include <optional>
+#include <span>
 #include <vector>
 
 namespace taut {
@@ -39,6 +32,30 @@ struct ObstacleReport {
   Vec3<double> force{0, 0, 0};  ///< on the bodies, N
 };
 
+/// The area that each vertex turns towards something flat, m^2: the most, over the normals of the
+/// triangles around it, that a third of them shows in that direction. On a smooth surface that is
+/// the area that the vertex stands for (vertex_areas); at an edge of a block it leaves out the
+/// other side of the edge, so that the faces of a block bear as they would were they alone.
+inline std::vector<double> shown_areas(Surface const& surface, std::span<Point const> points) {
+  std::vector<std::vector<Vec3<double>>> around(points.size());
+  for (Triangle const& t : surface.triangles) {
+    Vec3<double> edge[2];
+    for (int k = 0; k < 2; ++k)
+      for (int c = 0; c < 3; ++c) edge[k][c] = points[t[k + 1]][c] - points[t[0]][c];
+    for (int corner : t) around[corner].push_back((1.0 / 6) * cross(edge[0], edge[1]));
+  }
+  std::vector<double> area(points.size());
+  for (std::size_t v = 0; v < points.size(); ++v) {
+    for (Vec3<double> const& towards : around[v]) {
+      double shown = 0;
+      for (Vec3<double> const& a : around[v]) shown += std::max(0.0, dot(a, towards));
+      double const length = norm(towards);
+      if (length > 0) area[v] = std::max(area[v], shown / length);
+    }
+  }
+  return area;
+}
+
 /// What stopped a step.
 struct LimitingVertex {
   int vertex;    ///< of the mesh
@@ -47,7 +64,8 @@ struct LimitingVertex {
 };
 
 template <ObstacleShape Shape_, Barrier Barrier_ = Normalised<LogBarrier>,
-          class Stiffness_ = GivenStiffness, class Precision_ = Mixed, class Space_ = DefaultSpace>
+          class Stiffness_ = ElasticInclusiveStiffness, class Precision_ = Mixed,
+          class Space_ = DefaultSpace>
 class Obstacle {
 public:
   using Shape = Shape_;
@@ -134,19 +152,25 @@ public:
   double max_step(Positions const& x, Vectors const& p, double at_most) const {
     return state_->bound({}, x, p, at_most);
   }
-  /// The same: what is pinned may not cross the obstacle either, unless the obstacle holds it.
+  /// As max_advance: prescribed motion goes by the same share as the obstacle, and may not cross it
+  /// either, but for what the obstacle holds.
   double max_prescribed_step(Positions const& x, Vectors const& p, double at_most) const {
-    return state_->bound({}, x, p, at_most);
+    return max_advance(x, p, at_most);
   }
   /// What the last bound was cut by; none if it was not.
   std::optional<LimitingVertex> limiting_vertex() const { return state_->limiting; }
+  std::optional<Obstruction> obstruction() const {
+    auto const& at = state_->limiting;
+    if (!at) return {};
+    return Obstruction{fmt::format("a vertex at face {} of a {}", at->face, Shape::name),
+                       {at->vertex}};
+  }
 
-  /// To be called before each step with a StepStart (core/potential/term.hpp). Looks whether all
-  /// is inside: throws Error, which names the vertex, if one that is free is not, or is no further
+  /// Takes over the stiffness per vertex, for rules that need it, and looks whether all is inside:
+  /// throws Error, which names the vertex, if one that is free is not, or is no further from a face
   /// than round-off. What is fixed and not inside when the obstacle first meets it is held by the
   /// obstacle and free to go where it is told.
-  template <class Start>
-  void begin_step(Start const& start) const {
+  void begin_step(StepStart<Precision, Space> const& start) const {
     state_->take_stiffness(start.stiffness);
     state_->enter(start.x);
   }
@@ -249,7 +273,7 @@ private:
     }
     static Array<Real, Space> area_of(Surface const& host, std::vector<Point> const& rest) {
       Array<Real, Space> const field("obstacle_area", rest.size());
-      std::vector<double> const area = vertex_areas(host, rest);
+      std::vector<double> const area = shown_areas(host, rest);
       auto const to = Kokkos::create_mirror_view(field);
       for (int v : host.vertices) {
         to(v) = static_cast<Real>(area[v]);
@@ -299,7 +323,8 @@ private:
       double const gap = distance_to(table.faces.face[at.face], y - table.faces.origin).distance;
       char const* const where = gap > 0 ? "which is not above round-off" : "that is, beyond it";
       throw Error(
-          "obstacle: vertex {} at ({}, {}, {}) is {} m from face {} of a {}, {}: move the body or "
+          "obstacle: vertex {} at ({}, {}, {}) is {:.6g} m from face {} of a {}, {}: move the body "
+          "or "
           "the obstacle until there is a gap between them, or pin the vertex",
           at.vertex, y[0], y[1], y[2], gap, at.face, Shape::name, where);
     }
@@ -338,8 +363,8 @@ private:
   Table const& table() const {
     if (Stiffness_::per_vertex && state_->table.fields.stiffness.extent(0) == 0) {
       throw Error(
-          "obstacle: the stiffness rule '{}' needs a stiffness per vertex: call begin_step "
-          "before each step",
+          "obstacle: the stiffness rule '{}' needs to be told when a step begins: call begin_step "
+          "first, of the potential or of the term",
           Stiffness_::name);
     }
     return state_->table;

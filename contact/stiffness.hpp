@@ -42,7 +42,7 @@ concept StiffnessRule = requires(R const& rule, StiffnessFields<Precision, S> co
 };
 
 /// A rule that also knows the K of vertex v, N/m, against what does not give way and is no mesh.
-/// The vertex stands for all of its area there: nothing else of the surface meets it.
+/// All of the field `area` counts there: nothing else of the surface meets it.
 template <class R, class Precision, class S>
 concept VertexStiffnessRule = StiffnessRule<R, Precision, S> &&
     requires(R const& rule, StiffnessFields<Precision, S> const& fields, int v) {
