@@ -41,6 +41,14 @@ concept StiffnessRule = requires(R const& rule, StiffnessFields<Precision, S> co
   { rule(fields, kind, v) } -> std::same_as<double>;
 };
 
+/// A rule that also knows the K of vertex v, N/m, against what does not give way and is no mesh.
+/// All of the field `area` counts there: nothing else of the surface meets it.
+template <class R, class Precision, class S>
+concept VertexStiffnessRule = StiffnessRule<R, Precision, S> &&
+    requires(R const& rule, StiffnessFields<Precision, S> const& fields, int v) {
+  { rule.vertex(fields, v) } -> std::same_as<double>;
+};
+
 struct GivenStiffness {
   static constexpr char const* name = "given";
   static constexpr bool per_vertex = false;
@@ -57,6 +65,10 @@ struct GivenStiffness {
                             ? Kokkos::min(a[0], (a[1] + a[2] + a[3]) / 3)
                             : Kokkos::min(a[0] + a[1], a[2] + a[3]) / 6;
     return 0.25 * pressure * area / fields.dhat;
+  }
+  template <class Fields>
+  KOKKOS_FUNCTION double vertex(Fields const& fields, int v) const {
+    return pressure * double(fields.area(v)) / fields.dhat;
   }
 };
 
@@ -78,6 +90,10 @@ struct ElasticInclusiveStiffness {
       ++free;
     }
     return free > 0 ? factor * sum / free : 0;
+  }
+  template <class Fields>
+  KOKKOS_FUNCTION double vertex(Fields const& fields, int v) const {
+    return factor * double(fields.stiffness(v));
   }
 };
 
