@@ -175,7 +175,7 @@ public:
   /// For friction: appends all pairs that act at x, with mu by the objects of the surface.
   void lag(Positions const& x, kernels::FrictionMatrix<Space> const& mu,
            LaggedContacts<Precision, Space>& to) const {
-    if (!state_->complete({x, {}, 0, state_->fixed})) return;
+    if (!state_->complete(x)) return;
     using Kernel = kernels::LagPair<Pair, Precision, Space>;
     to.append("contact_lag", pairs().count, Kernel{pairs(), x, state_->surface.object, mu});
   }

@@ -14,6 +14,7 @@
 // turn. An obstacle that does not move has no sweep of its own in any of this.
 #pragma once
 
+#include <taut/contact/lag_obstacle.hpp>
 #include <taut/contact/obstacle_kernels.hpp>
 
 #include <algorithm>
@@ -173,6 +174,16 @@ public:
   void begin_step(StepStart<Precision, Space> const& start) const {
     state_->take_stiffness(start.stiffness);
     state_->enter(start.x);
+    FaceMotion const& motion = state_->track.motion();
+    state_->carry = {turn_matrix(motion.turn), motion.along, state_->table.faces.origin};
+  }
+
+  /// For friction: appends what acts at x; the coefficient of object k of the surface is mu(k, k).
+  void lag(Positions const& x, kernels::FrictionMatrix<Space> const& mu,
+           LaggedContacts<Precision, Space>& to) const {
+    using Kernel = kernels::LagFace<Barrier, Table, Precision, Space>;
+    to.append("obstacle_lag", vertices() * Shape::max_faces,
+              Kernel{table(), x, state_->object, mu, state_->carry});
   }
 
   /// Where the obstacle is, and where it is told to go.
@@ -224,6 +235,8 @@ private:
     Clearance clearance;
     Table table;
     ObstacleTrack track;
+    ObstacleCarry carry;                           ///< in the step that has begun
+    typename SurfaceViews<Space>::Indices object;  ///< per vertex of the mesh
     bool anew = true;  ///< nothing is known yet of what the obstacle holds
     std::optional<LimitingVertex> limiting;
     Reducer<Space, double> reducer;
@@ -244,6 +257,7 @@ private:
       }
       check(params, params.dhat.value_or(0.3 * edges.mean));
       table.vertex = to_space<Space>("obstacle_vertex", host.vertices);
+      object = to_space<Space>("obstacle_object", host.object);
       table.held = Fixed("obstacle_held", host.vertices.size());
       table.rule = params.stiffness;
       table.fields = {

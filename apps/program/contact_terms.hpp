@@ -4,6 +4,7 @@
 
 #include <taut/apps/program/scene_options.hpp>
 #include <taut/contact/contact.hpp>
+#include <taut/contact/friction.hpp>
 #include <taut/core/potential/any_terms.hpp>
 
 #include <memory>
@@ -17,6 +18,8 @@ public:
   virtual ~ProgramContact() = default;
   virtual ContactReport report(VectorField<typename P::position, DefaultSpace> const& x) const = 0;
   virtual double dhat() const = 0;  ///< m
+  /// Its pairs have friction; the coefficients are by the objects of the surface.
+  virtual void add_to(Friction<P>& friction, FrictionCoefficients const& mu) const = 0;
 };
 
 /// What touches: everything in the solver's order.
@@ -54,6 +57,10 @@ struct AnyStiffness {
   template <class Fields>
   KOKKOS_FUNCTION double operator()(Fields const& fields, PairKind kind, int const (&v)[4]) const {
     return given ? by_pressure(fields, kind, v) : inclusive(fields, kind, v);
+  }
+  template <class Fields>
+  KOKKOS_FUNCTION double vertex(Fields const& fields, int v) const {
+    return given ? by_pressure.vertex(fields, v) : inclusive.vertex(fields, v);
   }
 };
 

@@ -19,6 +19,9 @@ std::shared_ptr<ProgramContact<P> const> add_contact_of(AnySteppedTerms<P>& term
       return term.report(x);
     }
     double dhat() const override { return term.dhat(); }
+    void add_to(Friction<P>& friction, FrictionCoefficients const& mu) const override {
+      friction.add(term, mu);
+    }
   };
   typename Term::Params params;
   params.dhat = part.dhat;

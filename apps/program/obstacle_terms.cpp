@@ -56,6 +56,7 @@ public:
     ObstacleReport const r = term_.report(x);
     return {.candidates = 0, .contacts = r.contacts, .smallest_gap = r.smallest_gap};
   }
+  void add_to(Friction<P>& friction, double mu) const override { friction.add(term_, mu); }
   double depth(Point const& x) const override {
     auto const faces = taut::place(term_.shape(), term_.pose());
     double least = std::numeric_limits<double>::infinity();

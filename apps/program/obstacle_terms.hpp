@@ -19,6 +19,8 @@ public:
   virtual void place(RigidMap const& pose) const = 0;
   virtual RigidMap pose() const = 0;
   virtual ContactReport report(VectorField<typename P::position, DefaultSpace> const& x) const = 0;
+  /// Bodies rub on it with this coefficient.
+  virtual void add_to(Friction<P>& friction, double mu) const = 0;
   /// How far a point is inside, m: not above 0 if it is not.
   virtual double depth(Point const& x) const = 0;
 };

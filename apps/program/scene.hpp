@@ -97,7 +97,8 @@ struct InsideCylinderShape {
 struct SceneObstacle {
   std::string where;
   std::string name;
-  std::variant<HalfSpaceShape, InsideBoxShape, InsideSphereShape, InsideCylinderShape, ProceduralShape,
+  std::variant<HalfSpaceShape, InsideBoxShape, InsideSphereShape, InsideCylinderShape,
+               ProceduralShape,
                std::filesystem::path>
       geometry;                    ///< analytic ones are scaled already
   double scale = 1;                ///< of surfaces, before `placement`

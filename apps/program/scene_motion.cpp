@@ -21,6 +21,14 @@ RigidMap rotation_about(Point const& axis, double angle, Point const& centre) {
   return map;
 }
 
+RigidMap inverse(RigidMap const& map) {
+  RigidMap back;
+  for (int i = 0; i < 3; ++i)
+    for (int j = 0; j < 3; ++j) back.rotation[i][j] = map.rotation[j][i];
+  back.translation = -1.0 * back(map.translation);
+  return back;
+}
+
 RigidMap compose(RigidMap const& second, RigidMap const& first) {
   RigidMap map;
   for (std::size_t i = 0; i < 3; ++i)

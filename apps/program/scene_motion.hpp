@@ -51,6 +51,9 @@ struct RigidMap {
 /// Rotation by `angle` (radians, right-handed) about the unit vector `axis` through `centre`.
 RigidMap rotation_about(Point const& axis, double angle, Point const& centre);
 
+/// Of R x + t: R^T x - R^T t.
+RigidMap inverse(RigidMap const& map);
+
 /// The map that applies `first`, then `second`.
 RigidMap compose(RigidMap const& second, RigidMap const& first);
 

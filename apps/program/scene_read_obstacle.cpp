@@ -44,7 +44,7 @@ Geometry read_geometry(Section const& shape, SceneObstacle const& obstacle, Scen
   if (kind == "half_space") {
     shape.allow({"kind", "point", "normal"});
     return HalfSpaceShape{obstacle.scale * shape.point("point", "m", Point{}),
-                     shape.direction("normal", HalfSpaceShape{}.normal)};
+                          shape.direction("normal", HalfSpaceShape{}.normal)};
   }
   if (!shape.flag("inside", false)) return read_shape(shape, scene.resolution, ShapeOf::obstacle);
   return read_inside(shape, shape.choice("kind", hollow_kinds), obstacle.scale);

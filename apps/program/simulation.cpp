@@ -1,5 +1,5 @@
-#include <taut/apps/program/contact_terms.hpp>
 #include <taut/apps/program/methods.hpp>
+#include <taut/apps/program/obstacle_terms.hpp>
 #include <taut/apps/program/simulation.hpp>
 #include <taut/core/fem/ordering.hpp>
 #include <taut/core/fem/rest_shape.hpp>
@@ -73,7 +73,15 @@ public:
                   [&] { return arranged(read(i.x), true); }});
       };
     }
-    NewtonReport const report = advance_or_say(h, inner);
+    std::vector<RigidMap> const before = poses();
+    NewtonReport report;
+    try {
+      report = advance_or_say(h, inner);
+    } catch (Error const&) {
+      place(before);
+      throw;
+    }
+    if (report.stop == Stop::non_finite) place(before);
     if (report.stop == Stop::non_finite) {
       auto const inverted = inverted_tets(geometry_.mesh, read(reached_));
       throw Error(
@@ -92,7 +100,14 @@ public:
   int steps() const override { return state_.steps; }
   std::optional<ContactReport> contact() const override {
     if (!contact_) return {};
-    return contact_->report(state_.x);
+    ContactReport all = contact_->report(state_.x);
+    for (auto const& obstacle : formulas_) {
+      if (!obstacle) continue;
+      ContactReport const one = obstacle->report(state_.x);
+      all.contacts += one.contacts;
+      all.smallest_gap = std::min(all.smallest_gap, one.smallest_gap);
+    }
+    return all;
   }
   std::vector<Point> positions() const override { return arranged(read(state_.x), true); }
   std::vector<Point> velocities() const override { return arranged(read(state_.v), false); }
@@ -102,6 +117,12 @@ public:
     checkpoint.set("last_step", std::vector<double>{state_.last_step});
     checkpoint.set("steps", std::vector<std::int32_t>{state_.steps});
     for (auto const& [name, field] : fields()) checkpoint.set(name, flat(field));
+    std::vector<double> numbers;
+    for (RigidMap const& pose : poses()) {
+      for (Point const& row : pose.rotation) numbers.insert(numbers.end(), row.begin(), row.end());
+      numbers.insert(numbers.end(), pose.translation.begin(), pose.translation.end());
+    }
+    if (!numbers.empty()) checkpoint.set("obstacle_poses", numbers);
   }
   void restore(Checkpoint const& checkpoint) override {
     state_.time = checkpoint.number<double>("time");
@@ -119,6 +140,19 @@ public:
         for (int c = 0; c < 3; ++c) host(i, c) = numbers[3 * i + c];
       Kokkos::deep_copy(field, host);
     }
+    std::vector<RigidMap> read_poses = poses();
+    if (read_poses.empty()) return;
+    auto const& numbers = checkpoint.get<double>("obstacle_poses");
+    if (numbers.size() != 12 * read_poses.size()) {
+      throw Error("the checkpoint holds other obstacles than the scene; start the run again");
+    }
+    auto next = numbers.begin();
+    for (RigidMap& pose : read_poses) {
+      for (Point& row : pose.rotation)
+        for (double& entry : row) entry = *next++;
+      for (double& entry : pose.translation) entry = *next++;
+    }
+    place(read_poses);
   }
 
 private:
@@ -186,6 +220,9 @@ private:
   void add_contact(AnySteppedTerms<P, DefaultSpace>& terms, Unknowns<P> const& unknowns) {
     std::vector<Triangle> triangles = boundary_faces(geometry_.mesh.tets);
     double const dhat = distance_of_contact(triangles);
+    std::vector<Triangle> of_bodies = triangles;
+    for (Triangle& t : of_bodies)
+      for (auto& v : t) v = order_.new_vertex[v];
     for_each_surface([&](ObstacleSurface const& surface, std::int32_t first) {
       for (Triangle const& t : surface.mesh.triangles) {
         triangles.push_back({t[0] + first, t[1] + first, t[2] + first});
@@ -206,10 +243,36 @@ private:
         object[order_.new_vertex[part.first_vertex + v]] = static_cast<int>(k);
       }
     }
+    Surface const bodies = make_surface(std::move(of_bodies), object);
     ContactPart<P> part{unknowns, make_surface(std::move(triangles), std::move(object)), {}, dhat};
     for (std::int32_t v : order_.vertices) part.rest.push_back(mesh_.points[v]);
     contact_ = add_contact_term<P>(terms, part, *scene_.contact);
+    part.surface = bodies;
+    for (SceneObstacle const& obstacle : scene_.obstacles) {
+      formulas_.push_back(obstacle.is_surface()
+                              ? nullptr
+                              : add_obstacle_term<P>(terms, part, *scene_.contact, obstacle));
+    }
+    refuse_outside();
     for (ObjectPart const& body : geometry_.objects) refuse_small(body, contact_->dhat());
+  }
+  /// What starts beyond an obstacle that is a formula, or on it.
+  void refuse_outside() const {
+    for (std::size_t k = 0; k < formulas_.size(); ++k) {
+      if (!formulas_[k]) continue;
+      for (ObjectPart const& body : geometry_.objects) {
+        for (int v = 0; v < body.vertices; ++v) {
+          Point const& x = geometry_.start[body.first_vertex + v];
+          if (formulas_[k]->depth(x) > 0) continue;
+          throw Error(
+              "{}: vertex {} of object {} at ({:.6g}, {:.6g}, {:.6g}) starts {:.3g} m beyond "
+              "obstacle "
+              "{}: move one of them (object.NAME.translate, obstacle.NAME.translate)",
+              scene_.file.string(), v, body.name, x[0], x[1], x[2], -formulas_[k]->depth(x),
+              scene_.obstacles[k].name);
+        }
+      }
+    }
   }
   /// By default a share of the edges of the bodies, however coarse the obstacles are.
   double distance_of_contact(std::vector<Triangle> const& bodies) const {
@@ -302,6 +365,10 @@ private:
         prescribe_vertex(order_.new_vertex[first + v], map(surface.mesh.points[v]), mark);
       }
     });
+    for (std::size_t k = 0; k < formulas_.size(); ++k) {
+      SceneObstacle const& obstacle = scene_.obstacles[k];
+      if (formulas_[k]) formulas_[k]->move_to(compose(obstacle.motion.at(t), obstacle.placement));
+    }
     Kokkos::deep_copy(potential_.unknowns().fixed, fixed_);
     Kokkos::deep_copy(potential_.unknowns().prescribed, prescribed_);
 
@@ -331,7 +398,21 @@ private:
 
   /// Where space around an obstacle that is a formula has been brought since time 0.
   RigidMap place_of(std::size_t obstacle) const {
-    return scene_.obstacles[obstacle].motion.at(state_.time);
+    return compose(formulas_[obstacle]->pose(), inverse(scene_.obstacles[obstacle].placement));
+  }
+  /// Of all obstacles that are formulas.
+  std::vector<RigidMap> poses() const {
+    std::vector<RigidMap> all;
+    for (auto const& obstacle : formulas_) {
+      if (obstacle) all.push_back(obstacle->pose());
+    }
+    return all;
+  }
+  void place(std::vector<RigidMap> const& all) const {
+    auto next = all.begin();
+    for (auto const& obstacle : formulas_) {
+      if (obstacle) obstacle->place(*next++);
+    }
   }
 
   /// Names what holds up pins.
@@ -448,6 +529,7 @@ private:
   Ordering order_;
   std::vector<double> lumped_;                        ///< kg, in the order of mesh_
   std::shared_ptr<ProgramContact<P> const> contact_;  ///< null: nothing keeps bodies apart
+  std::vector<std::shared_ptr<ProgramObstacle<P> const>> formulas_;  ///< null: it is a surface
   ProgramPotential<P> potential_;
   State<P> state_;
   Positions reached_;  ///< by the last minimisation, also where the step was then refused
