@@ -55,9 +55,9 @@ public:
         forces_("forces", size()),
         fixed_(Kokkos::create_mirror_view(potential_.unknowns().fixed)),
         prescribed_(Kokkos::create_mirror_view(potential_.unknowns().prescribed)),
-        euler_(scene.solver),
-        bdf2_(scene.solver),
-        static_(scene.solver) {
+        euler_(scene.solver, lagging()),
+        bdf2_(scene.solver, lagging()),
+        static_(scene.solver, lagging()) {
     write(state_.x, geometry.start, mesh_.points);
     write(state_.v, geometry.velocity, std::vector<Point>(size()));
     refuse_forbidden_inversion();
@@ -255,6 +255,31 @@ private:
     }
     refuse_outside();
     for (ObjectPart const& body : geometry_.objects) refuse_small(body, contact_->dhat());
+    add_friction(terms, part);
+  }
+  void add_friction(AnySteppedTerms<P, DefaultSpace>& terms, ContactPart<P> const& part) const {
+    double const mu = scene_.contact->number("friction");
+    bool any = mu > 0;
+    for (SceneObstacle const& obstacle : scene_.obstacles) any |= obstacle.friction.value_or(0) > 0;
+    if (!any) return;
+    double const speed = scene_.contact->number("stick_speed");
+    Friction<P> friction(part.unknowns, part.rest,
+                         {speed > 0 ? std::optional<double>(speed) : std::nullopt});
+    FrictionCoefficients of_pairs(mu);
+    int const bodies = static_cast<int>(geometry_.objects.size());
+    for (std::size_t k = 0; k < scene_.obstacles.size(); ++k) {
+      double const own = scene_.obstacles[k].friction.value_or(mu);
+      if (formulas_[k]) formulas_[k]->add_to(friction, own);
+      if (formulas_[k] || own == mu) continue;
+      for (int body = 0; body < bodies; ++body) {
+        of_pairs.set(body, bodies + static_cast<int>(k), own);
+      }
+    }
+    contact_->add_to(friction, of_pairs);
+    terms.add(friction);
+  }
+  Lagging lagging() const {
+    return {scene_.contact ? scene_.contact->integer("friction_passes") : 1};
   }
   /// What starts beyond an obstacle that is a formula, or on it.
   void refuse_outside() const {
