@@ -41,7 +41,7 @@ int check_command(std::filesystem::path const& result, bool intersections) {
   ResultMesh const& all = reader.mesh();
   TetMesh const& mesh = all.mesh;
   std::optional<ObjectIntersections> surface;
-  if (intersections) surface.emplace(mesh.tets, all.object, all.object_names, mesh.points.size());
+  if (intersections) surface.emplace(all);
   constexpr std::int64_t in_detail = 3;  // frames whose first intersections are listed
   std::int64_t bad = 0, intersecting = 0;
   std::size_t sum = 0;

@@ -9,40 +9,45 @@
 
 namespace taut {
 
-namespace {
+ObjectIntersections::ObjectIntersections(ResultMesh const& mesh) : test_(pieces(mesh)) {}
 
-IntersectionMesh boundary(std::vector<Tet> const& tets, std::vector<std::int32_t> const& body) {
-  auto const faces = boundary_faces(tets);
-  return {faces, edges_of(faces), body};
+IntersectionMesh ObjectIntersections::pieces(ResultMesh const& mesh) {
+  std::size_t const vertices = mesh.mesh.points.size(), tets = mesh.mesh.tets.size();
+  IntersectionMesh result{boundary_faces(mesh.mesh.tets), {}, {}};
+  result.body.assign(vertices, -1);
+  std::vector<std::int32_t> number(vertices, -1);
+  auto const add = [&](auto const& cell, std::int32_t first, std::int32_t object) {
+    std::int32_t& piece = number[first];
+    if (piece < 0) {
+      piece = static_cast<std::int32_t>(name_of_body_.size());
+      name_of_body_.push_back(mesh.object_names[object]);
+      is_obstacle_.push_back(mesh.kind(object) != ObjectKind::body);
+    }
+    for (std::int32_t const v : cell) result.body[v] = piece;
+  };
+  auto const first_of_tets = smallest_connected(vertices, mesh.mesh.tets);
+  for (std::size_t t = 0; t < tets; ++t) {
+    Tet const& tet = mesh.mesh.tets[t];
+    add(tet, first_of_tets[tet[0]], mesh.object[t]);
+  }
+  auto const first_of_triangles = smallest_connected(vertices, mesh.triangles);
+  for (std::size_t t = 0; t < mesh.triangles.size(); ++t) {
+    Triangle const& triangle = mesh.triangles[t];
+    std::int32_t const object = mesh.object[tets + t];
+    if (mesh.kind(object) == ObjectKind::drawn_only) continue;
+    add(triangle, first_of_triangles[triangle[0]], object);
+    result.triangles.push_back(triangle);
+  }
+  result.edges = edges_of(result.triangles);
+  return result;
 }
 
-}  // namespace
-
-ObjectIntersections::ObjectIntersections(std::vector<Tet> const& tets,
-                                         std::span<std::int32_t const> object,
-                                         std::vector<std::string> const& names,
-                                         std::size_t vertices)
-    : ObjectIntersections(tets, pieces(tets, object, names, vertices)) {}
-
-ObjectIntersections::ObjectIntersections(std::vector<Tet> const& tets, Pieces pieces)
-    : name_of_body_(std::move(pieces.names)), test_(boundary(tets, pieces.of_vertex)) {}
-
-ObjectIntersections::Pieces ObjectIntersections::pieces(std::vector<Tet> const& tets,
-                                                        std::span<std::int32_t const> object,
-                                                        std::vector<std::string> const& names,
-                                                        std::size_t vertices) {
-  auto const first = smallest_connected(vertices, tets);
-  Pieces pieces{std::vector<std::int32_t>(vertices, -1), {}};
-  std::vector<std::int32_t> number(vertices, -1);
-  for (std::size_t t = 0; t < tets.size(); ++t) {
-    std::int32_t& piece = number[first[tets[t][0]]];
-    if (piece < 0) {
-      piece = static_cast<std::int32_t>(pieces.names.size());
-      pieces.names.push_back(names[object[t]]);
-    }
-    for (std::int32_t const v : tets[t]) pieces.of_vertex[v] = piece;
-  }
-  return pieces;
+std::vector<Intersection> ObjectIntersections::find(std::span<Point const> x) const {
+  std::vector<Intersection> found = test_.find(x);
+  std::erase_if(found, [&](Intersection const& i) {
+    return is_obstacle_[i.edge_body] && is_obstacle_[i.triangle_body];
+  });
+  return found;
 }
 
 std::string ObjectIntersections::count(std::vector<Intersection> const& found) const {

@@ -1,7 +1,9 @@
-// The exact intersection test on the objects of a scene or a result: what it finds, in words.
+// The exact intersection test on the bodies and obstacles of a scene or a result: what it finds, in
+// words.
 #pragma once
 
 #include <taut/contact/intersection.hpp>
+#include <taut/core/io/vtkhdf.hpp>
 
 #include <span>
 #include <string>
@@ -9,16 +11,17 @@
 
 namespace taut {
 
-/// Looks at the boundary of a tet mesh. Each connected piece of an object is a body, so that one
-/// piece inside another is found as well; all are named as their object is.
+/// Looks at the boundary of the tets and at the triangles of obstacles, but for those that are only
+/// drawn. Each connected piece of an object is a body, so that one piece inside another is found as
+/// well; all are named as their object is. Obstacles among themselves may meet: where bodies are is
+/// what matters.
 class ObjectIntersections {
 public:
-  /// `object` per tet, an index into `names`; `vertices` of the mesh.
-  ObjectIntersections(std::vector<Tet> const& tets, std::span<std::int32_t const> object,
-                      std::vector<std::string> const& names, std::size_t vertices);
+  explicit ObjectIntersections(ResultMesh const& mesh);
 
-  /// At positions x, m. Throws Error if a vertex of the boundary is not finite.
-  std::vector<Intersection> find(std::span<Point const> x) const { return test_.find(x); }
+  /// At positions x, m, one per point of the mesh. Throws Error if a vertex of the boundary or of
+  /// an obstacle is not finite.
+  std::vector<Intersection> find(std::span<Point const> x) const;
 
   /// "340 intersections (300 of ball with floor, 40 of ball with itself)"
   std::string count(std::vector<Intersection> const& found) const;
@@ -28,16 +31,17 @@ public:
 
   std::string text(Intersection const& one) const { return one.text(name_of_body_); }
 
+  /// Whether an obstacle is one of the two.
+  bool with_obstacle(Intersection const& one) const {
+    return is_obstacle_[one.edge_body] || is_obstacle_[one.triangle_body];
+  }
+
 private:
-  struct Pieces {
-    std::vector<std::int32_t> of_vertex;
-    std::vector<std::string> names;  ///< of the objects that they are of
-  };
-  static Pieces pieces(std::vector<Tet> const& tets, std::span<std::int32_t const> object,
-                       std::vector<std::string> const& names, std::size_t vertices);
-  ObjectIntersections(std::vector<Tet> const& tets, Pieces pieces);
+  /// Numbers the pieces as bodies, and returns their triangles with the body of every vertex.
+  IntersectionMesh pieces(ResultMesh const& mesh);
 
   std::vector<std::string> name_of_body_;
+  std::vector<bool> is_obstacle_;  ///< per body
   IntersectionTest test_;
 };
 

@@ -4,6 +4,7 @@
 #include <taut/apps/program/memory.hpp>
 #include <taut/apps/program/methods.hpp>
 #include <taut/apps/program/run_identity.hpp>
+#include <taut/apps/program/scene_result.hpp>
 #include <taut/apps/program/simulation.hpp>
 #include <taut/core/io/checkpoint.hpp>
 #include <taut/core/io/mesh_reader.hpp>
@@ -82,23 +83,21 @@ void clear_folder(std::filesystem::path const& folder) {
   }
 }
 
-ObjectIntersections intersections_of(SceneGeometry const& geometry) {
-  std::vector<std::string> names;
-  for (ObjectPart const& object : geometry.objects) names.push_back(object.name);
-  return {geometry.mesh.tets, geometry.object_of_tet, names, geometry.mesh.points.size()};
-}
-
 /// What starts intersecting stays so where there is contact. Where there is none, it may be meant
 /// to: it is warned of, unless the run is to be free of intersections.
 void check_start(Scene const& scene, SceneGeometry& geometry, ObjectIntersections const& surface,
                  RunOptions const& options) {
-  auto const found = surface.find(geometry.start);
+  auto const found = surface.find(result_mesh(scene, geometry).mesh.points);
   if (found.empty()) return;
   std::string const what =
       fmt::format("{}: the scene starts with {}; the first: {}", scene.file.string(),
                   surface.count(found), surface.text(found.front()));
   if (scene.contact || (options.check != CheckRun::off && !options.restart)) {
-    throw Error("{}. Move the objects apart (object.NAME.translate){}", what,
+    bool const obstacle = std::any_of(found.begin(), found.end(), [&](Intersection const& i) {
+      return surface.with_obstacle(i);
+    });
+    throw Error("{}. Move the objects apart (object.NAME.translate{}){}", what,
+                obstacle ? " or obstacle.NAME.translate" : "",
                 scene.contact
                     ? ", or let one that meets itself start at rest"
                     : ", let one that meets itself start at rest, or run without --check");
@@ -178,7 +177,7 @@ private:
       clear_folder(folder_);
     }
     result_.emplace(ResultWriter::create(
-        result_path(), result_mesh(), capacity(),
+        result_path(), result_mesh(scene_, geometry_), capacity(),
         force ? ResultWriter::IfExists::replace : ResultWriter::IfExists::refuse));
     write_frame();
     log_.emplace(folder_ / "report.jsonl");
@@ -195,7 +194,8 @@ private:
     if (recorded_ < scene_.frames) {
       written = std::min(written, std::int64_t{recorded_ / scene_.output.every + 1});
     }
-    result_.emplace(ResultWriter::resume(result_path(), result_mesh(), written, capacity()));
+    result_.emplace(
+        ResultWriter::resume(result_path(), result_mesh(scene_, geometry_), written, capacity()));
     // Line k of the report is step k, counted from 1.
     log_.emplace(folder_ / "report.jsonl", recorded_ + 1);
   }
@@ -206,13 +206,6 @@ private:
   /// Every so many steps, and the last one.
   std::int64_t capacity() const {
     return (scene_.frames + scene_.output.every - 1) / scene_.output.every + 1;
-  }
-
-  ResultMesh result_mesh() const {
-    ResultMesh mesh{geometry_.mesh, geometry_.object_of_tet, {}};
-    mesh.mesh.points = geometry_.start;
-    for (ObjectPart const& object : geometry_.objects) mesh.object_names.push_back(object.name);
-    return mesh;
   }
 
   void step() {
@@ -307,8 +300,9 @@ private:
     result_->append(simulation_->time(), x, simulation_->velocities());
     if (!scene_.output.obj) return;
     if (boundary_.empty()) boundary_ = boundary_faces(geometry_.mesh.tets);
+    // Bodies alone: the points of obstacles are behind theirs.
     write_obj(folder_ / "obj" / fmt::format("frame_{:05}.obj", simulation_->steps()),
-              {x, boundary_});
+              {{x.begin(), x.begin() + std::ssize(geometry_.mesh.points)}, boundary_});
   }
 
   void checkpoint() {
@@ -404,7 +398,7 @@ private:
 int run_command(RunOptions const& options) {
   Scene const scene = load_scene(find_scene(options.scene.scene), options.scene.changes);
   SceneGeometry geometry = build_within_memory(scene);
-  ObjectIntersections const surface = intersections_of(geometry);
+  ObjectIntersections const surface(result_mesh(scene, geometry));
   check_start(scene, geometry, surface, options);
   for (std::string const& warning : geometry.warnings) fmt::print(stderr, "warning: {}\n", warning);
   return Run(scene, geometry, options, options.check == CheckRun::off ? nullptr : &surface).run();

@@ -227,10 +227,16 @@ void add_forces(Scene const& scene, SceneGeometry& geometry) {
 }
 
 void add_obstacles(Scene const& scene, SceneGeometry& geometry) {
-  for (std::size_t i = 0; i < scene.obstacles.size(); ++i)
-    if (scene.obstacles[i].is_surface())
-      geometry.obstacle_meshes.push_back(
-          {i, obstacle_surface(scene.obstacles[i], geometry.warnings)});
+  constexpr int cells_across = 16;  // of pictures
+  for (std::size_t i = 0; i < scene.obstacles.size(); ++i) {
+    SceneObstacle const& obstacle = scene.obstacles[i];
+    bool const is_surface = obstacle.is_surface();
+    geometry.obstacle_meshes.push_back(
+        {i,
+         is_surface ? obstacle_surface(obstacle, geometry.warnings)
+                    : triangles_of(obstacle, bounding_box(geometry.start), cells_across),
+         !is_surface});
+  }
 }
 
 }  // namespace

@@ -39,11 +39,12 @@ struct Force {
   Window window;
 };
 
-/// The surface of an obstacle.
+/// The triangles of an obstacle. Analytic ones are touched as what they are; theirs are for
+/// pictures alone, and nothing collides with them.
 struct ObstacleSurface {
   std::size_t obstacle;     ///< index into Scene::obstacles, which has its motion
   TriangleMesh mesh;        ///< at time 0, placed in the scene; closed ones oriented outward
-  bool drawn_only = false;  ///< for pictures: the obstacle is a formula
+  bool drawn_only = false;  ///< of an analytic obstacle
 };
 
 struct SceneGeometry {
@@ -56,7 +57,7 @@ struct SceneGeometry {
   std::vector<MaterialParameters> materials;
   std::vector<Pin> pins;  ///< no vertex is in two of them
   std::vector<Force> forces;
-  std::vector<ObstacleSurface> obstacle_meshes;
+  std::vector<ObstacleSurface> obstacle_meshes;  ///< one for every obstacle, in their order
   std::vector<std::string> warnings;
 };
 

@@ -1,7 +1,9 @@
 """Draws a result of `taut run`: PNGs of chosen frames and an animation, off screen.
 
-The camera stands still and sees every frame that is drawn. Surfaces are coloured by object, or by
-speed or displacement on one scale for all frames.
+The camera stands still and sees the bodies of every frame that is drawn. They are coloured by object,
+or by speed or displacement on one scale for all frames. Obstacles are grey and let the bodies behind
+them be seen; planes are the ground and the walls that bodies throw shadows on, and those between the
+camera and the bodies are left out.
 """
 
 import argparse
@@ -11,22 +13,98 @@ import sys
 # Draw off screen even where there is a screen; the choice of window must stand before VTK is loaded.
 os.environ.pop("DISPLAY", None)
 os.environ.setdefault("VTK_DEFAULT_OPENGL_WINDOW", "vtkEGLRenderWindow")
+import matplotlib
 import numpy as np
 import pyvista as pv
 from PIL import Image
 from vtkmodules.vtkIOHDF import vtkHDFReader
 
-# Okabe and Ito's colours, lightened a little: told apart by all kinds of colour vision.
-COLOURS = ["#4a9bd1", "#e8894a", "#3fb58f", "#e2b93b", "#d98cb8", "#7fc4ec", "#8a8a8a"]
+from draw_light import Light, frame_of
+
+# Okabe and Ito's colours, lightened a little: told apart by all kinds of colour vision. Grey is for
+# obstacles.
+COLOURS = ["#4a9bd1", "#f0935a", "#45b892", "#ecc344", "#dd92bd", "#8ccdf0", "#7a6fc0"]
+GROUND, WALL, OBSTACLE = "#e9edf1", "#e4e8ed", "#8d98a5"
+BODY, TOUCHED, DRAWN_ONLY = 0, 1, 2  # kinds of objects, as in core/io/vtkhdf.hpp
 VIEW_ANGLE = 25.0  # degrees, from the lower to the upper edge of the picture
-MARGIN = 0.92  # the part of the picture that the body may fill
+MARGIN = 0.92  # the part of the picture that the bodies may fill
+AROUND_BODIES = 0.15  # what is framed of an obstacle: as far from the bodies, in their diagonals
+CELLS = 200  # across the picture of a plane
 TITLES = {"speed": "speed, m/s", "displacement": "displacement, m"}
 
 
-class Frames:
-    """The surface of the result, its points frame by frame."""
+def rgb(colour):
+    return np.array(pv.Color(colour).int_rgb, dtype=float)
 
-    def __init__(self, path):
+
+class Surface:
+    """The surface of some cells of the grid. It follows the points of the grid; its vertices on edges
+    that are sharp at first are doubled, so that they stay crisp."""
+
+    def __init__(self, grid, cells):
+        part = grid.extract_cells(cells).extract_surface(algorithm="dataset_surface")
+        part = part.clean(point_merging=False).triangulate()
+        part = part.compute_normals(cell_normals=False, split_vertices=True, feature_angle=40,
+                                    consistent_normals=False)
+        self.vertex = np.array(part["vertex"])
+        self.object = np.array(part["object"]).astype(int)
+        self.mesh = pv.PolyData(np.array(part.points), faces=np.array(part.faces))
+
+    def move(self, points):
+        self.mesh.points = points[self.vertex]
+        self.mesh["Normals"] = np.array(self.mesh.compute_normals(
+            cell_normals=False, split_vertices=False, consistent_normals=False)["Normals"])
+        self.mesh.point_data.active_normals_name = "Normals"
+
+    def object_of_vertex(self, all_objects):
+        """One number per vertex; no vertex is of two objects."""
+        of_vertex = np.zeros(self.mesh.n_points, dtype=int)
+        of_vertex[self.mesh.regular_faces] = all_objects[:, None]
+        return of_vertex
+
+
+class Plane:
+    """A half space. Three points of its patch say where it is; normals point to the bodies."""
+
+    def __init__(self, triangle):
+        self.triangle = triangle
+
+    @staticmethod
+    def is_one(points):
+        sizes = np.linalg.svd(points - points.mean(axis=0), compute_uv=False)
+        return sizes[-1] < 1e-6 * sizes[0]
+
+    def move(self, points):
+        a, b, c = points[self.triangle]
+        self.point = a
+        normal = np.cross(b - a, c - a)
+        self.normal = normal / np.linalg.norm(normal)
+
+    def patch(self, around, radius):
+        """The part of the plane under a ball, twice as wide: points, and 0 to 1 from its edge on."""
+        foot = around - (around - self.point) @ self.normal * self.normal
+        first, second = frame_of(self.normal)
+        steps = np.linspace(-1, 1, CELLS + 1)
+        a, b = (axis.ravel() for axis in np.meshgrid(steps, steps, indexing="ij"))
+        fade = np.clip((1 - np.hypot(a, b)) / 0.6, 0, 1)
+        points = foot + 2 * radius * (np.outer(a, first) + np.outer(b, second))
+        return points, fade * fade * (3 - 2 * fade)
+
+    @staticmethod
+    def cells():
+        i, j = (index.ravel() for index in np.mgrid[:CELLS, :CELLS])
+        corner = i * (CELLS + 1) + j
+        above = corner + CELLS + 1
+        return pv.PolyData.from_regular_faces(
+            np.zeros(((CELLS + 1)**2, 3)),
+            np.stack([corner, above, above + 1, corner + 1], axis=1)).faces
+
+
+class Frames:
+    """What a result shows, frame by frame: bodies, obstacles that are surfaces, rooms (what keeps
+    bodies inside) and planes."""
+
+    def __init__(self, path, kinds):
         # VTK's own reader: what pyvista offers of it differs from release to release.
         self.reader = vtkHDFReader()
         self.reader.SetFileName(path)
@@ -35,11 +113,19 @@ class Frames:
         grid = self.read(0)
         grid["vertex"] = np.arange(grid.n_points)
         self.rest = np.array(grid.points)
-        surface = grid.extract_surface(algorithm="dataset_surface").clean(tolerance=0)
-        # Vertices on sharp edges of the first frame are doubled, once, so that edges stay crisp.
-        self.surface = surface.compute_normals(cell_normals=False, split_vertices=True,
-                                               feature_angle=40)
-        self.vertex = np.array(self.surface["vertex"])
+        objects = np.array(grid["object"]).astype(int)
+        kind = np.array(kinds)[objects]
+        self.bodies = Surface(grid, kind == BODY)
+        self.obstacles = Surface(grid, kind == TOUCHED) if (kind == TOUCHED).any() else None
+        self.planes, room = [], np.zeros(len(objects), dtype=bool)
+        for number in np.unique(objects[kind == DRAWN_ONLY]):
+            cells = objects == number
+            first = grid.get_cell(int(np.flatnonzero(cells)[0]))
+            if Plane.is_one(np.array(grid.extract_cells(cells).points)):
+                self.planes.append(Plane(np.array(first.point_ids)))
+            else:
+                room |= cells
+        self.room = Surface(grid, room) if room.any() else None
         self.velocity = np.zeros_like(self.rest)
 
     def __len__(self):
@@ -51,16 +137,19 @@ class Frames:
         return pv.wrap(self.reader.GetOutput()).copy()
 
     def load(self, frame):
-        """Moves the surface to the frame and returns it."""
+        """Moves everything to the frame."""
         grid = self.read(frame)
-        self.surface.points = np.array(grid.points)[self.vertex]
+        points = np.array(grid.points)
+        for part in (self.bodies, self.obstacles, self.room, *self.planes):
+            if part is not None:
+                part.move(points)
         if "velocity" in grid.point_data:
             self.velocity = np.array(grid.point_data["velocity"])
-        return self.surface
 
     def field(self, name):
-        vectors = self.velocity[self.vertex] if name == "speed" else (
-            self.surface.points - self.rest[self.vertex])
+        vertex = self.bodies.vertex
+        vectors = self.velocity[vertex] if name == "speed" else (
+            self.bodies.mesh.points - self.rest[vertex])
         return np.linalg.norm(vectors, axis=1)
 
 
@@ -69,44 +158,100 @@ class Picture:
 
     def __init__(self, frames, drawn, options):
         self.frames, self.colour = frames, options.colour
-        self.font = max(8, options.size[1] // 36)  # pixels
-        # The camera sees all frames.
-        cloud, top = [], 0.0
+        self.size = options.size
+        # Drawn so much larger: four samples per pixel are too few for edges of strong contrast.
+        self.scale = 2 if max(self.size) <= 4096 else 1
+        bodies, framed, self.top = [], [], 0.0
         for done, frame in enumerate(drawn):
             say(f"looking at frame {frame}", done, len(drawn))
-            surface = frames.load(frame)
-            cloud.append(extremes(surface.points))
+            frames.load(frame)
+            bodies.append(extremes(frames.bodies.mesh.points))
+            if frames.obstacles:
+                framed.append(frames.obstacles.mesh.points)
             if self.colour != "object":
-                top = max(top, frames.field(self.colour).max())
+                self.top = max(self.top, frames.field(self.colour).max())
+        bodies = np.concatenate(bodies)
+        low, high = bodies.min(axis=0), bodies.max(axis=0)
+        self.middle, self.reach = 0.5 * (low + high), 0.5 * np.linalg.norm(high - low) or 1
+        room = 2 * AROUND_BODIES * self.reach
+        near = [p[((p > low - room) & (p < high + room)).all(axis=1)] for p in framed]
+        self.plotter = pv.Plotter(off_screen=True, lighting="none",
+                                  window_size=[self.scale * n for n in self.size])
+        self.plotter.set_background("#f6f8fa", top="#dfe6ee")
+        key = self.place_camera(np.concatenate([bodies, *map(extremes, filter(len, near))]), options)
+        self.light = Light(key, [frames.bodies.mesh])
+        self.add_bodies()
+        self.add_planes()
+        self.add_obstacles()
+        self.plotter.enable_anti_aliasing("msaa", multi_samples=4)
 
-        self.plotter = pv.Plotter(off_screen=True, window_size=options.size, lighting="none")
-        self.plotter.set_background("#ffffff", top="#e9eef3")
-        self.add_surface(top)
-        self.place_camera(np.concatenate(cloud), options)
-        self.plotter.enable_anti_aliasing("ssaa")
-
-    def add_surface(self, top):
-        surface = self.frames.surface
-        look = {"smooth_shading": True, "split_sharp_edges": False, "ambient": 0.18, "diffuse": 0.85,
-                "specular": 0.18, "specular_power": 18, "copy_mesh": False}
+    def add_bodies(self):
+        bodies = self.frames.bodies
         if self.colour == "object":
-            objects = surface["object"].astype(int)
-            surface["colour"] = np.array(
-                [pv.Color(COLOURS[i % len(COLOURS)]).int_rgb for i in range(objects.max() + 1)],
-                dtype=np.uint8)[objects]
-            self.plotter.add_mesh(surface, scalars="colour", rgb=True, **look)
+            of_vertex = bodies.object_of_vertex(bodies.object)
+            self.base = np.array([rgb(c) for c in COLOURS])[of_vertex % len(COLOURS)]
         else:
-            surface[self.colour] = np.zeros(surface.n_points)
-            self.plotter.add_mesh(surface, scalars=self.colour, cmap="viridis",
-                                  clim=[0, top or 1], **look, scalar_bar_args={
+            # The scale beside the picture is that of two points that are not seen.
+            scale = pv.PolyData(np.tile(self.middle, (2, 1)))
+            scale[self.colour] = np.array([0, self.top or 1])
+            font = self.scale * max(8, self.size[1] // 36)  # pixels
+            self.plotter.add_mesh(scale, scalars=self.colour, cmap="viridis", opacity=0,
+                                  scalar_bar_args={
                                       "title": TITLES[self.colour], "vertical": True,
-                                      "color": "#333333", "n_labels": 3,
-                                      "title_font_size": self.font, "label_font_size": self.font, "width": 0.05,
-                                      "height": 0.4, "position_x": 0.9, "position_y": 0.3})
+                                      "color": "#333333", "n_labels": 3, "title_font_size": font,
+                                      "label_font_size": font, "width": 0.05, "height": 0.4,
+                                      "position_x": 0.9, "position_y": 0.3})
+        bodies.mesh["colour"] = np.zeros((bodies.mesh.n_points, 3), dtype=np.uint8)
+        self.plotter.add_mesh(bodies.mesh, scalars="colour", rgb=True, copy_mesh=False,
+                              smooth_shading=True, split_sharp_edges=False, ambient=0.56,
+                              diffuse=0.62, specular=0.12, specular_power=24)
+
+    def add_obstacles(self):
+        frames = self.frames
+        if frames.obstacles:
+            self.plotter.add_mesh(frames.obstacles.mesh, color=OBSTACLE, opacity=0.3, ambient=0.45,
+                                  diffuse=0.6, specular=0.25, specular_power=30, smooth_shading=True,
+                                  split_sharp_edges=False, copy_mesh=False)
+        if frames.room:
+            mesh = frames.room.mesh
+            mesh["colour"] = np.zeros((mesh.n_points, 3), dtype=np.uint8)
+            self.plotter.add_mesh(mesh, scalars="colour", rgb=True, culling="back", ambient=0.75,
+                                  diffuse=0.3, smooth_shading=True, split_sharp_edges=False,
+                                  copy_mesh=False)
+
+    def add_planes(self):
+        """Before what lets them be seen through itself: the translucent is drawn in this order."""
+        for plane in self.frames.planes:
+            mesh = pv.PolyData(np.tile(self.middle, (3, 1)), faces=[3, 0, 1, 2])
+            mesh["colour"] = np.zeros((3, 4), dtype=np.uint8)
+            plane.actor = self.plotter.add_mesh(mesh, scalars="colour", rgb=True, lighting=False)
+
+    def draw_planes(self):
+        """Those that are seen from their bodies' side, each up to the others."""
+        eye = np.array(self.plotter.camera.position)
+        planes = self.frames.planes
+        for plane in planes:
+            plane.actor.visibility = bool((eye - plane.point) @ plane.normal > 0)
+            if not plane.actor.visibility:
+                continue
+            points, alpha = plane.patch(self.middle, 1.5 * self.reach)
+            around, key, both = self.light.arriving(points, np.tile(plane.normal, (len(points), 1)))
+            shade = (blurred(around, CELLS // 20) + blurred(key, 1)) / both
+            mesh = pv.PolyData(points, faces=Plane.cells())
+            colour = np.outer(0.3 + 0.7 * shade, rgb(GROUND if plane.normal[1] > 0.5 else WALL))
+            mesh["colour"] = np.column_stack([colour, 255 * alpha])
+            for other in planes:
+                if other is not plane and mesh.n_points:
+                    mesh = mesh.clip(normal=other.normal, origin=other.point, invert=False)
+            plane.actor.visibility = mesh.n_points > 0
+            if mesh.n_points:
+                mesh["colour"] = mesh["colour"].round().astype(np.uint8)
+                mesh.set_active_scalars("colour")
+                plane.actor.mapper.SetInputData(mesh)
 
     def place_camera(self, points, options):
-        """As near as all points fit. A key light over the left shoulder of the camera, a weak one
-        from the right."""
+        """As near as all points fit. Places the lights and returns the direction of the first: over
+        the left shoulder of the camera; a weaker one is at its right, a third by the camera."""
         towards = np.array(options.view) / np.linalg.norm(options.view)
         aside = np.cross([0, 1, 0] if abs(towards[1]) < 0.999 else [0, 0, -1], towards)
         aside /= np.linalg.norm(aside)
@@ -129,23 +274,52 @@ class Picture:
         camera.focal_point = centre
         camera.position = centre + towards * distance
         camera.up = above
-        camera.clipping_range = (max(0.01 * radius, distance - 2 * radius), distance + 2 * radius)
-        for side, up, strength in ((-0.8, 1.2, 0.95), (1.2, 0.3, 0.35)):
-            position = centre + 10 * radius * (towards + side * aside + up * above)
-            self.plotter.add_light(pv.Light(position=position, focal_point=centre,
-                                            intensity=strength))
+        camera.clipping_range = (max(0.01 * radius, distance - 6 * radius), distance + 6 * radius)
+        directions = [towards + side * aside + up * above
+                      for side, up in ((-0.7, 1.5), (1.2, 0.4), (0.1, 0.1))]
+        for direction, strength in zip(directions, (0.72, 0.22, 0.22)):
+            self.plotter.add_light(pv.Light(position=centre + 10 * radius * direction,
+                                            focal_point=centre, intensity=strength))
+        return directions[0]
 
     def show(self, frame):
         """The picture of a frame, [height][width][rgb]."""
-        surface = self.frames.load(frame)
+        frames = self.frames
+        frames.load(frame)
+        body = frames.bodies.mesh
+        self.light.aim(body.points)
         if self.colour != "object":
-            surface[self.colour][:] = self.frames.field(self.colour)
-        # Normals follow the moved points; the vertices on edges are doubled already.
-        surface["Normals"] = np.array(surface.compute_normals(
-            cell_normals=False, split_vertices=False, consistent_normals=False)["Normals"])
-        surface.Modified()
+            values = frames.field(self.colour) / (self.top or 1)
+            self.base = 255 * matplotlib.colormaps["viridis"](values)[:, :3]
+        self.paint(body, self.base, 0.3)
+        if frames.room:
+            self.paint(frames.room.mesh, rgb(WALL), 0.3)
+        self.draw_planes()
         self.plotter.render()
-        return self.plotter.screenshot(return_img=True)
+        image = Image.fromarray(self.plotter.screenshot(return_img=True))
+        return np.asarray(image.resize(self.size, Image.Resampling.BOX))
+
+    def paint(self, mesh, base, least):
+        """Colours as they are in the light that arrives, but at least so much of it."""
+        shade = least + (1 - least) * self.light.share(mesh.points, mesh["Normals"])
+        mesh["colour"][:] = (shade[:, None] * base).round()
+        mesh.Modified()
+
+
+def blurred(values, width):
+    """Values on the grid of a plane's patch, without the edges of the shadows of single directions:
+    their means over `width` cells to each side."""
+    grid = values.reshape(CELLS + 1, CELLS + 1)
+    for _ in range(2):  # twice even is a tent
+        for axis in (0, 1):
+            ends = [(width, width) if a == axis else (0, 0) for a in (0, 1)]
+            sums = np.cumsum(np.pad(grid, ends, mode="edge"), axis=axis)
+            sums = np.insert(sums, 0, 0, axis=axis)
+            count = 2 * width + 1
+            here, there = [slice(None)] * 2, [slice(None)] * 2
+            here[axis], there[axis] = slice(count, None), slice(None, -count)
+            grid = (sums[tuple(here)] - sums[tuple(there)]) / count
+    return grid.ravel()
 
 
 def extremes(points):
@@ -190,6 +364,7 @@ def main():
     parser.add_argument("--result", required=True)
     parser.add_argument("--out", required=True)
     parser.add_argument("--frames", type=int, nargs="+", required=True)
+    parser.add_argument("--kinds", type=int, nargs="+", required=True, help="of the objects")
     parser.add_argument("--colour", choices=["object", "speed", "displacement"], required=True)
     parser.add_argument("--size", type=int, nargs=2, required=True)
     parser.add_argument("--view", type=float, nargs=3, required=True)
@@ -198,7 +373,7 @@ def main():
     parser.add_argument("--most-frames", type=int, default=150)
     options = parser.parse_args()
 
-    frames = Frames(options.result)
+    frames = Frames(options.result, options.kinds)
     stride = -(-len(frames) // options.most_frames)
     moving = list(range(0, len(frames), stride)) if options.animation else []
     picture = Picture(frames, sorted({*options.frames, *moving}), options)

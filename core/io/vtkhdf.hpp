@@ -2,8 +2,12 @@
 // (https://docs.vtk.org/en/latest/vtk_file_formats/vtkhdf_file_format/index.html), which VTK 9.3
 // and ParaView 5.12 open, and an XDMF sidecar that points into it for older ParaViews.
 //
-//   Points (moving, m), PointData/velocity (m/s), CellData/object (number of the object a tet is
-//   of); /taut/object_names: the objects' names in that numbering.
+//   Points (moving, m), PointData/velocity (m/s), CellData/object (number of the object a cell is
+//   of); /taut/object_names: the objects' names in that numbering; /taut/object_kind: 0 for bodies,
+//   1 for obstacles, 2 for what is only drawn (results without it have bodies alone).
+//
+// Cells are the tets, then the triangles of obstacles. XDMF's form of mixed cells would need a
+// second copy of them: the sidecar shows the tets alone.
 //
 // A run may be killed at any moment, or its disk may fill: every finished frame stays readable. The
 // file has its final layout from the start, laid out for `capacity` frames (unwritten ones are
@@ -22,11 +26,23 @@
 
 namespace taut {
 
+enum class ObjectKind : std::uint8_t {
+  body = 0,
+  obstacle = 1,   ///< its triangles are what bodies touch
+  drawn_only = 2  ///< its triangles are a picture of what bodies touch
+};
+
 /// What does not change between frames.
 struct ResultMesh {
-  TetMesh mesh;                           ///< points: at t = 0
-  std::vector<std::int32_t> object;       ///< per tet, an index into object_names
-  std::vector<std::string> object_names;  ///< UTF-8
+  TetMesh mesh;                              ///< points: at t = 0, those of the triangles included
+  std::vector<std::int32_t> object;          ///< per tet, then per triangle: into object_names
+  std::vector<std::string> object_names;     ///< UTF-8
+  std::vector<Triangle> triangles = {};      ///< of obstacles; their vertices are mesh.points
+  std::vector<ObjectKind> object_kind = {};  ///< per object; empty: all are bodies
+
+  ObjectKind kind(std::size_t object_number) const {
+    return object_kind.empty() ? ObjectKind::body : object_kind.at(object_number);
+  }
 };
 
 class ResultWriter {
@@ -35,7 +51,8 @@ public:
 
   /// Begins a result at `path` (name it .vtkhdf) laid out for `capacity` frames; missing folders
   /// are made, the layout grows if more are appended. `velocities`: whether frames carry them.
-  /// Throws Error if the file exists and is not to be replaced, or if it cannot be written.
+  /// Throws Error if the file exists and is not to be replaced, if it cannot be written, or if
+  /// objects and kinds are not as many as ResultMesh says.
   static ResultWriter create(std::filesystem::path const& path, ResultMesh const& mesh,
                              std::int64_t capacity, IfExists if_exists, bool velocities = true);
 
@@ -72,7 +89,7 @@ public:
   std::int64_t frames() const;
   std::int64_t capacity() const;             ///< frames the file is laid out for
   std::vector<double> const& times() const;  ///< s, one per frame
-  ResultMesh const& mesh() const;            ///< its points are those of t = 0
+  ResultMesh const& mesh() const;            ///< points: at t = 0; a kind for every object
   bool has_velocities() const;
 
   /// One per point; 0 <= frame < frames(). Throws Error otherwise, or if the file cannot be read.

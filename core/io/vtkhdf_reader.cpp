@@ -9,6 +9,8 @@ namespace {
 
 using hdf5::Handle;
 
+constexpr std::uint8_t vtk_triangle = 5, vtk_tetra = 10;
+
 std::vector<Point> read_points(hid_t dataset, std::int64_t first, std::size_t rows) {
   std::vector<Point> points(rows);
   hdf5::read_rows(dataset, H5T_NATIVE_DOUBLE, static_cast<hsize_t>(first), rows, points.data(),
@@ -26,6 +28,30 @@ void check_shape(hid_t dataset, std::size_t points, std::int64_t frames) {
   }
 }
 
+/// The number of tets; behind them there are triangles.
+std::size_t count_tets(std::vector<std::uint8_t> const& types) {
+  const auto first = std::find(types.begin(), types.end(), vtk_triangle);
+  const bool in_order = std::count(types.begin(), first, vtk_tetra) == first - types.begin() &&
+                        std::count(first, types.end(), vtk_triangle) == types.end() - first;
+  if (!in_order) throw Error("its cells are not tets with triangles behind them");
+  return static_cast<std::size_t>(first - types.begin());
+}
+
+/// Results of before there were obstacles have no kinds.
+std::vector<ObjectKind> read_kinds(hid_t file, std::size_t objects) {
+  std::vector<ObjectKind> kinds(objects, ObjectKind::body);
+  if (H5Lexists(file, "taut/object_kind", H5P_DEFAULT) <= 0) return kinds;
+  const auto numbers = hdf5::read_dataset<std::uint8_t>(file, "taut/object_kind");
+  if (numbers.size() != objects) throw Error("not every object has a kind");
+  for (std::size_t i = 0; i < objects; ++i) {
+    if (numbers[i] > static_cast<std::uint8_t>(ObjectKind::drawn_only)) {
+      throw Error("there is no kind {} of objects", numbers[i]);
+    }
+    kinds[i] = static_cast<ObjectKind>(numbers[i]);
+  }
+  return kinds;
+}
+
 ResultMesh read_mesh(hid_t file) {
   ResultMesh result;
   const Handle points = hdf5::open_dataset(file, "taut/points");
@@ -34,18 +60,29 @@ ResultMesh read_mesh(hid_t file) {
   hdf5::stored_values(points, "its points");
   result.mesh.points = read_points(points, 0, shape[0]);
   result.object_names = hdf5::read_strings(file, "taut/object_names");
+  result.object_kind = read_kinds(file, result.object_names.size());
   result.object = hdf5::read_dataset<std::int32_t>(file, "VTKHDF/CellData/object");
+  const auto below = [](std::vector<std::int32_t> const& numbers, std::size_t end) {
+    return std::all_of(numbers.begin(), numbers.end(), [&](std::int32_t number) {
+      return number >= 0 && static_cast<std::size_t>(number) < end;
+    });
+  };
+  if (!below(result.object, result.object_names.size())) throw Error("its cells are of objects that do not exist");
 
+  const auto types = hdf5::read_dataset<std::uint8_t>(file, "VTKHDF/Types");
+  const std::size_t tets = count_tets(types), triangles = types.size() - tets;
   const auto ids = hdf5::read_dataset<std::int32_t>(file, "VTKHDF/Connectivity");
-  const bool in_range = std::all_of(ids.begin(), ids.end(), [&](std::int32_t id) {
-    return id >= 0 && static_cast<std::size_t>(id) < result.mesh.points.size();
-  });
-  if (!in_range || ids.size() != 4 * result.object.size()) {
-    throw Error("its cells are not tets of its points");
+  if (!below(ids, result.mesh.points.size()) || ids.size() != 4 * tets + 3 * triangles ||
+      types.size() != result.object.size()) {
+    throw Error("its cells are not those of its points");
   }
-  result.mesh.tets.reserve(ids.size() / 4);
-  for (std::size_t i = 0; i < ids.size(); i += 4) {
+  result.mesh.tets.reserve(tets);
+  for (std::size_t i = 0; i < 4 * tets; i += 4) {
     result.mesh.tets.push_back({ids[i], ids[i + 1], ids[i + 2], ids[i + 3]});
+  }
+  result.triangles.reserve(triangles);
+  for (std::size_t i = 4 * tets; i < ids.size(); i += 3) {
+    result.triangles.push_back({ids[i], ids[i + 1], ids[i + 2]});
   }
   return result;
 }

@@ -29,7 +29,7 @@ using hdf5::Handle;
 using hdf5::Shape;
 
 constexpr std::array tables{"/taut/steps_a", "/taut/steps_b"};
-constexpr std::uint8_t vtk_tetra = 10;
+constexpr std::uint8_t vtk_triangle = 5, vtk_tetra = 10;
 
 template <class T, class Container>
 void write_list(hid_t parent, std::string const& name, Container const& values) {
@@ -92,10 +92,36 @@ void make_tables(hid_t file, std::size_t points, std::int64_t capacity, bool vel
   }
 }
 
+void write_cells(hid_t grid, ResultMesh const& mesh) {
+  const std::size_t tets = mesh.mesh.tets.size(), cells = tets + mesh.triangles.size();
+  std::vector<std::int64_t> ids, offsets{0};
+  ids.reserve(4 * tets + 3 * mesh.triangles.size());
+  offsets.reserve(cells + 1);
+  const auto add = [&](auto const& cell) {
+    ids.insert(ids.end(), cell.begin(), cell.end());
+    offsets.push_back(static_cast<std::int64_t>(ids.size()));
+  };
+  for (Tet const& tet : mesh.mesh.tets) add(tet);
+  for (Triangle const& triangle : mesh.triangles) add(triangle);
+  write_count(grid, "NumberOfCells", cells);
+  write_count(grid, "NumberOfConnectivityIds", ids.size());
+  write_list<std::int64_t>(grid, "Connectivity", ids);
+  write_list<std::int64_t>(grid, "Offsets", offsets);
+  std::vector<std::uint8_t> types(tets, vtk_tetra);
+  types.resize(cells, vtk_triangle);
+  write_list<std::uint8_t>(grid, "Types", types);
+}
+
+/// One per object.
+std::vector<ObjectKind> kinds_of(ResultMesh const& mesh) {
+  std::vector<ObjectKind> kinds;
+  for (std::size_t i = 0; i < mesh.object_names.size(); ++i) kinds.push_back(mesh.kind(i));
+  return kinds;
+}
+
 /// Writes a result without frames; `path` is valid only once this has returned.
 void lay_out(fs::path const& path, ResultMesh const& mesh, std::int64_t capacity, bool velocities) {
   const std::size_t points = mesh.mesh.points.size();
-  const std::size_t tets = mesh.mesh.tets.size();
   Handle file = hdf5::create_file(path);
   // First of all, so that its header lies in the file's first page.
   Handle grid = hdf5::make_group(file, "VTKHDF");
@@ -109,23 +135,15 @@ void lay_out(fs::path const& path, ResultMesh const& mesh, std::int64_t capacity
     hdf5::write_attribute(grid, "Type", text, {}, type.data());
   }
   write_count(grid, "NumberOfPoints", points);
-  write_count(grid, "NumberOfCells", tets);
-  write_count(grid, "NumberOfConnectivityIds", 4 * tets);
-  {
-    std::vector<std::int64_t> ids;
-    ids.reserve(4 * tets);
-    for (Tet const& tet : mesh.mesh.tets) ids.insert(ids.end(), tet.begin(), tet.end());
-    write_list<std::int64_t>(grid, "Connectivity", ids);
-    ids.resize(tets + 1);
-    for (std::size_t i = 0; i < ids.size(); ++i) ids[i] = static_cast<std::int64_t>(4 * i);
-    write_list<std::int64_t>(grid, "Offsets", ids);
-  }
-  write_list<std::uint8_t>(grid, "Types", std::vector<std::uint8_t>(tets, vtk_tetra));
+  write_cells(grid, mesh);
   const Handle cell_data = hdf5::make_group(grid, "CellData");
   write_list<std::int32_t>(cell_data, "object", mesh.object);
 
   const Handle ours = hdf5::make_group(file, "taut");
   hdf5::write_strings(ours, "object_names", mesh.object_names);
+  std::vector<std::uint8_t> kinds;
+  for (ObjectKind const kind : kinds_of(mesh)) kinds.push_back(static_cast<std::uint8_t>(kind));
+  write_list<std::uint8_t>(ours, "object_kind", kinds);
   {
     const Handle start = hdf5::make_dataset(ours, "points", H5T_NATIVE_DOUBLE, {points, 3});
     hdf5::write_rows(start, H5T_NATIVE_DOUBLE, 0, points, mesh.mesh.points.data(), "points");
@@ -143,7 +161,7 @@ void lay_out(fs::path const& path, ResultMesh const& mesh, std::int64_t capacity
 /// after its disk ran full, so this is found out before.
 void check_free_space(fs::path const& path, ResultMesh const& mesh, std::int64_t capacity) {
   const std::uintmax_t bytes = (1 << 16) + sizeof(Point) * mesh.mesh.points.size() +
-                               64 * mesh.mesh.tets.size() +
+                               64 * (mesh.mesh.tets.size() + mesh.triangles.size()) +
                                64 * static_cast<std::uintmax_t>(capacity);
   std::error_code unknown;
   const fs::path folder = path.has_parent_path() ? path.parent_path() : fs::path(".");
@@ -188,8 +206,9 @@ struct ResultWriter::File {
     {
       // Closed before the file is opened for writing: HDF5 refuses both in one process.
       ResultReader const reader(path_);
-      TetMesh const& mesh = reader.mesh().mesh;
-      shape_ = {mesh.points.size(), mesh.tets.size(), reader.capacity(), reader.has_velocities()};
+      ResultMesh const& all = reader.mesh();
+      shape_ = {all.mesh.points.size(), all.mesh.tets.size(), all.triangles.size(),
+                reader.capacity(), reader.has_velocities()};
       times_ = reader.times();
     }
     const hdf5::Quiet quiet;
@@ -279,9 +298,13 @@ ResultWriter ResultWriter::create(fs::path const& path, ResultMesh const& mesh,
         "--force to replace it.",
         path.string());
   }
-  if (mesh.object.size() != mesh.mesh.tets.size()) {
-    throw Error("{}: {} tets have {} object numbers; give one per tet.", path.string(),
-                mesh.mesh.tets.size(), mesh.object.size());
+  if (mesh.object.size() != mesh.mesh.tets.size() + mesh.triangles.size()) {
+    throw Error("{}: {} tets and {} triangles have {} object numbers; give one for each.",
+                path.string(), mesh.mesh.tets.size(), mesh.triangles.size(), mesh.object.size());
+  }
+  if (!mesh.object_kind.empty() && mesh.object_kind.size() != mesh.object_names.size()) {
+    throw Error("{}: {} objects have {} kinds; give one for each, or none.", path.string(),
+                mesh.object_names.size(), mesh.object_kind.size());
   }
   make_parent_folder(path);
   name_errors(path, "the result cannot be begun", [&] {
@@ -301,7 +324,8 @@ ResultWriter ResultWriter::resume(fs::path const& path, ResultMesh const& mesh, 
     ResultReader const reader(path);
     ResultMesh const& old = reader.mesh();
     if (old.mesh.points.size() != mesh.mesh.points.size() || old.mesh.tets != mesh.mesh.tets ||
-        old.object != mesh.object || old.object_names != mesh.object_names) {
+        old.triangles != mesh.triangles || old.object != mesh.object ||
+        old.object_names != mesh.object_names || old.object_kind != kinds_of(mesh)) {
       throw Error(
           "{}: this result is of another mesh or other objects; restart with the scene it "
           "was made from.",

@@ -65,16 +65,27 @@ std::string XdmfSidecar::grid(std::int64_t frame, double time) const {
         shape_.points, static_cast<std::size_t>(frame) * shape_.points, capacity * shape_.points,
         result_, dataset, frame);
   };
+  // The first `count` of `all` whole numbers.
+  const auto first = [&](std::string_view dataset, std::size_t count, std::size_t all, int bytes) {
+    const std::string numbers = fmt::format(
+        "<DataItem Dimensions=\"{}\" NumberType=\"Int\" Precision=\"{}\" Format=\"HDF\">"
+        "{}:/VTKHDF/{}</DataItem>",
+        all, bytes, result_, dataset);
+    if (count == all) return numbers;
+    return fmt::format(
+        "<DataItem ItemType=\"HyperSlab\" Dimensions=\"{0}\">"
+        "<DataItem Dimensions=\"3 1\" NumberType=\"Int\" Format=\"XML\">0 1 {0}</DataItem>"
+        "{1}</DataItem>",
+        count, numbers);
+  };
   std::string xml = fmt::format(
       "<Grid Name=\"frame {0}\"><Time Value=\"{1}\"/>\n"
-      "<Topology TopologyType=\"Tetrahedron\" NumberOfElements=\"{2}\">"
-      "<DataItem Dimensions=\"{3}\" NumberType=\"Int\" Precision=\"8\" Format=\"HDF\">"
-      "{4}:/VTKHDF/Connectivity</DataItem></Topology>\n"
-      "<Geometry GeometryType=\"XYZ\">{5}</Geometry>\n"
-      "<Attribute Name=\"object\" Center=\"Cell\">"
-      "<DataItem Dimensions=\"{2}\" NumberType=\"Int\" Precision=\"4\" Format=\"HDF\">"
-      "{4}:/VTKHDF/CellData/object</DataItem></Attribute>\n",
-      frame, time, shape_.tets, 4 * shape_.tets, result_, rows("Points"));
+      "<Topology TopologyType=\"Tetrahedron\" NumberOfElements=\"{2}\">{3}</Topology>\n"
+      "<Geometry GeometryType=\"XYZ\">{4}</Geometry>\n"
+      "<Attribute Name=\"object\" Center=\"Cell\">{5}</Attribute>\n",
+      frame, time, shape_.tets,
+      first("Connectivity", 4 * shape_.tets, 4 * shape_.tets + 3 * shape_.triangles, 8),
+      rows("Points"), first("CellData/object", shape_.tets, shape_.tets + shape_.triangles, 4));
   if (shape_.velocities) {
     xml += fmt::format(
         "<Attribute Name=\"velocity\" AttributeType=\"Vector\" Center=\"Node\">{}</Attribute>\n",

@@ -14,6 +14,7 @@ namespace taut {
 struct ResultShape {
   std::size_t points = 0;
   std::size_t tets = 0;
+  std::size_t triangles = 0;  ///< behind the tets; not shown
   std::int64_t capacity = 0;  ///< frames the datasets have room for
   bool velocities = true;
 };

@@ -4,6 +4,7 @@
 
 #include <taut/apps/program/commands.hpp>
 #include <taut/apps/program/intersections.hpp>
+#include <taut/apps/program/scene_result.hpp>
 #include <taut/core/fem/shapes.hpp>
 #include <taut/core/io/file.hpp>
 #include <taut/core/io/vtkhdf.hpp>
@@ -77,7 +78,180 @@ void write_result(std::filesystem::path const& file, std::vector<double> const& 
   }
 }
 
+/// Adds a surface as an object of its own, moved by `away`.
+void add_surface(ResultMesh& all, TriangleMesh const& mesh, Point const& away,
+                 std::string const& name, ObjectKind kind) {
+  auto const first = static_cast<std::int32_t>(all.mesh.points.size());
+  auto const number = static_cast<std::int32_t>(all.object_names.size());
+  for (Point const& x : mesh.points)
+    all.mesh.points.push_back({x[0] + away[0], x[1] + away[1], x[2] + away[2]});
+  for (Triangle t : mesh.triangles) {
+    for (std::int32_t& v : t) v += first;
+    all.triangles.push_back(t);
+    all.object.push_back(number);
+  }
+  all.object_names.push_back(name);
+  all.object_kind.push_back(kind);
+}
+
+/// A body, a unit cube around the origin.
+ResultMesh one_cube() {
+  TetMesh const cube = make_shape(BoxShape{}, 2);
+  return {cube, std::vector<std::int32_t>(cube.tets.size(), 0), {"cube"}, {}, {ObjectKind::body}};
+}
+
+TriangleMesh box_surface(double size) {
+  return boundary_surface(make_shape(BoxShape{{size, size, size}}, 2));
+}
+
 }  // namespace
+
+TEST_CASE("bodies and obstacles must not meet, obstacles among themselves may", "[intersections]") {
+  ResultMesh all = one_cube();
+  auto const found_with = [](ResultMesh const& mesh) {
+    ObjectIntersections const surface(mesh);
+    auto const found = surface.find(mesh.mesh.points);
+    for (Intersection const& i : found) CHECK(surface.with_obstacle(i));
+    return found.empty() ? "" : surface.count(found) + ": " + surface.text(found.front());
+  };
+  SECTION("apart") {
+    add_surface(all, box_surface(1), {1.25, 0, 0}, "wall", ObjectKind::obstacle);
+    CHECK(found_with(all).empty());
+  }
+  SECTION("crossing") {
+    add_surface(all, box_surface(1), {0.7, 0.1, 0.05}, "wall", ObjectKind::obstacle);
+    CHECK_THAT(found_with(all),
+               ContainsSubstring(" of cube with wall): edge ") && ContainsSubstring(" crosses "));
+  }
+  SECTION("touching") {
+    add_surface(all, box_surface(1), {1, 0, 0}, "wall", ObjectKind::obstacle);
+    CHECK_THAT(found_with(all), ContainsSubstring(" of cube with wall): edge "));
+  }
+  SECTION("a body inside a closed obstacle") {
+    add_surface(all, box_surface(3), {0, 0, 0}, "shell", ObjectKind::obstacle);
+    CHECK_THAT(found_with(all), ContainsSubstring("1 intersection (1 of cube with shell): cube is "
+                                                  "inside shell: its vertex "));
+  }
+  SECTION("an obstacle inside a body") {
+    add_surface(all, box_surface(0.2), {0, 0, 0}, "core", ObjectKind::obstacle);
+    CHECK_THAT(found_with(all), ContainsSubstring("1 intersection (1 of core with cube): core is "
+                                                  "inside cube: its vertex "));
+  }
+  SECTION("an open obstacle has no inside, but an edge and a side") {
+    TriangleMesh open = box_surface(3);
+    open.triangles.pop_back();
+    add_surface(all, open, {0, 0, 0}, "shell", ObjectKind::obstacle);
+    CHECK(found_with(all).empty());
+    all = one_cube();
+    add_surface(all, open, {1.9, 0.1, 0}, "shell", ObjectKind::obstacle);
+    CHECK_THAT(found_with(all), ContainsSubstring(" of cube with shell): edge "));
+  }
+  SECTION("obstacles that cross, that hold each other and that cross themselves") {
+    add_surface(all, box_surface(1), {5, 0, 0}, "one", ObjectKind::obstacle);
+    add_surface(all, box_surface(1), {5.3, 0.1, 0.2}, "other", ObjectKind::obstacle);
+    add_surface(all, box_surface(0.2), {4.9, 0, 0}, "within", ObjectKind::obstacle);
+    TriangleMesh twice = box_surface(1);
+    auto const count = static_cast<std::int32_t>(twice.points.size());
+    for (std::int32_t v = 0; v < count; ++v) {
+      Point const x = twice.points[static_cast<std::size_t>(v)];
+      twice.points.push_back({x[0] + 0.4, x[1] + 0.1, x[2]});
+    }
+    auto const triangles = twice.triangles;
+    for (auto const& [a, b, c] : triangles)
+      twice.triangles.push_back({a + count, b + count, c + count});
+    add_surface(all, twice, {9, 0, 0}, "doubled", ObjectKind::obstacle);
+    CHECK(found_with(all).empty());
+  }
+  SECTION("a picture of an obstacle is in nobody's way") {
+    add_surface(all, box_surface(1), {0.7, 0.1, 0.05}, "wall", ObjectKind::drawn_only);
+    add_surface(all, box_surface(3), {0, 0, 0}, "room", ObjectKind::drawn_only);
+    // Not even where it is not finite.
+    all.mesh.points.back()[0] = std::numeric_limits<double>::quiet_NaN();
+    CHECK(found_with(all).empty());
+  }
+}
+
+TEST_CASE("check looks for bodies in obstacles, as the result says what is one",
+          "[intersections]") {
+  ScratchFolder const folder;
+  auto const file = folder.write("place", "").parent_path() / "result.vtkhdf";
+  ResultMesh all = one_cube();
+  add_surface(all, box_surface(1), {2, 0.1, 0.05}, "wall", ObjectKind::obstacle);
+  add_surface(all, box_surface(1), {2.2, 0, 0}, "post", ObjectKind::obstacle);
+  add_surface(all, box_surface(9), {0, 0, 0}, "room", ObjectKind::drawn_only);
+  auto writer = ResultWriter::create(file, all, 2, ResultWriter::IfExists::refuse, false);
+  for (int k = 0; k < 2; ++k) {
+    auto x = all.mesh.points;
+    // The wall, its points behind the body's, is pushed through the body.
+    std::size_t const first = one_cube().mesh.points.size();
+    for (std::size_t v = 0; v < box_surface(1).points.size(); ++v) x[first + v][0] -= 1.3 * k;
+    writer.append(k, x, {});
+  }
+  Outcome const outcome = taut_with("check " + file.string());
+  INFO(outcome.text);
+  CHECK(outcome.status == 1);
+  CHECK_THAT(outcome.text,
+             !ContainsSubstring("frame 0 ") &&
+                 ContainsSubstring("frame 1 (1 s): 0 inverted elements, 0 values not finite, ") &&
+                 ContainsSubstring(" of cube with wall)\n  edge ") &&
+                 ContainsSubstring("2 frames of 144 tets: 1 with faults; "));
+}
+
+TEST_CASE("a scene's obstacles come behind its bodies in the result", "[intersections]") {
+  ScratchFolder const folder;
+  Scene const scene = load_scene(folder.write("scene.toml", collision + R"(
+[[obstacle]]
+name = "floor"
+shape = { kind = "half_space", point = [0, -2, 0] }
+
+[[obstacle]]
+name = "block"
+shape = { kind = "box", size = [1, 1, 1], resolution = 1 }
+translate = [5, 0, 0]
+
+[contact]
+)"));
+  SceneGeometry const geometry = build_geometry(scene);
+  ResultMesh const result = result_mesh(scene, geometry);
+  CHECK(result.object_names == std::vector<std::string>{"left", "right", "floor", "block"});
+  CHECK(result.object_kind == std::vector<ObjectKind>{ObjectKind::body, ObjectKind::body,
+                                                      ObjectKind::drawn_only,
+                                                      ObjectKind::obstacle});
+  CHECK(result.mesh.tets == geometry.mesh.tets);
+  REQUIRE(result.object.size() == result.mesh.tets.size() + result.triangles.size());
+  std::size_t const bodies = geometry.mesh.points.size();
+  CHECK(std::equal(geometry.start.begin(), geometry.start.end(), result.mesh.points.begin()));
+  for (std::size_t t = 0; t < result.triangles.size(); ++t) {
+    bool const floor = result.object[result.mesh.tets.size() + t] == 2;
+    for (std::int32_t const v : result.triangles[t]) {
+      REQUIRE(static_cast<std::size_t>(v) >= bodies);
+      Point const& x = result.mesh.points.at(static_cast<std::size_t>(v));
+      CHECK((floor ? x[1] == -2 : std::abs(x[0] - 5) == 0.5));
+    }
+  }
+  CHECK(std::count(result.object.begin(), result.object.end(), 3) == 12);
+}
+
+TEST_CASE("a scene that starts with a body in an obstacle is refused, naming both",
+          "[intersections]") {
+  auto const [obstacle, what] = GENERATE(
+      std::pair<std::string, std::string>{
+          R"(shape = { kind = "box", size = [9, 9, 9], resolution = 1 })",
+          "(1 of left with trap, 1 of right with trap); the first: left is inside trap"},
+      std::pair<std::string, std::string>{
+          R"(shape = { kind = "sphere", radius = 0.2, resolution = 3 })",
+          "(1 of left with trap); the first: trap is inside left"},
+      std::pair<std::string, std::string>{
+          R"(shape = { kind = "box", size = [0.3, 9, 0.3], resolution = 1 })",
+          "of left with trap); the first: edge "});
+  Collision scene(collision + "\n[[obstacle]]\nname = \"trap\"\n" + obstacle + "\n[contact]\n");
+  CHECK_THROWS_MATCHES(
+      run_command(scene.options), Error,
+      MessageMatches(ContainsSubstring("collision.toml: the scene starts with ") &&
+                     ContainsSubstring(what) &&
+                     ContainsSubstring("object.NAME.translate or obstacle.NAME.translate")));
+  CHECK_FALSE(std::filesystem::exists(scene.options.out));
+}
 
 TEST_CASE("check names what intersects, where and when", "[intersections]") {
   ScratchFolder const folder;
@@ -134,7 +308,7 @@ TEST_CASE("the most frequent pairs of objects are named, the others counted", "[
       object.push_back(k);
     }
   }
-  ObjectIntersections const surface(all.tets, object, names, all.points.size());
+  ObjectIntersections const surface(ResultMesh{all, object, names});
   auto const found = surface.find(all.points);
   CHECK_THAT(surface.count(found), ContainsSubstring("and 3 more pairs of objects)"));
   CHECK_THAT(surface.first_few(found, 2),
@@ -152,7 +326,7 @@ TEST_CASE("a piece of an object inside another piece of it is found", "[intersec
     pieces.tets.push_back(tet);
   }
   std::vector<std::int32_t> const object(pieces.tets.size(), 0);
-  ObjectIntersections const surface(pieces.tets, object, {"all"}, pieces.points.size());
+  ObjectIntersections const surface(ResultMesh{pieces, object, {"all"}});
   auto const found = surface.find(pieces.points);
   CHECK(surface.count(found) == "1 intersection (1 of all with itself)");
 }

@@ -77,6 +77,7 @@ std::vector<std::string> collisions(Scene const& scene, SceneGeometry const& geo
   }
   std::vector<Triangle> triangles = boundary_faces(geometry.mesh.tets);
   for (ObstacleSurface const& surface : geometry.obstacle_meshes) {
+    if (surface.drawn_only) continue;
     auto const first = static_cast<std::int32_t>(points.size());
     for (Triangle triangle : surface.mesh.triangles) {
       for (std::int32_t& v : triangle) v += first;

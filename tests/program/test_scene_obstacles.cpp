@@ -41,6 +41,7 @@ TriangleMesh surface_of(std::string const& obstacle) {
   SceneGeometry const geometry = build_geometry(load(obstacle));
   REQUIRE(geometry.obstacle_meshes.size() == 1);
   CHECK(geometry.obstacle_meshes[0].obstacle == 0);
+  CHECK_FALSE(geometry.obstacle_meshes[0].drawn_only);
   return geometry.obstacle_meshes[0].mesh;
 }
 
@@ -118,7 +119,7 @@ TEST_CASE("a surface is scaled, then rotated, then translated, and stays oriente
   CHECK_THAT(volume(mesh), WithinRel(48.0, 1e-12));
 }
 
-TEST_CASE("what keeps bodies inside, and half of space, are no meshes and keep their numbers") {
+TEST_CASE("what keeps bodies inside, and half of space, keep their numbers and are drawn only") {
   Scene const scene =
       load(R"(shape = { kind = "half_space", point = [0, -2, 0], normal = [0, 2, 0] }
 friction = 0.5
@@ -148,8 +149,19 @@ angular_velocity = 90
 name = "drum"
 shape = { kind = "cylinder", inside = true, radius = 2, height = 1 }
 rotate = { axis = [0, 0, 1], angle = 90 })");
-  CHECK(build_geometry(scene).obstacle_meshes.empty());
   REQUIRE(scene.obstacles.size() == 4);
+  SceneGeometry const geometry = build_geometry(scene);
+  REQUIRE(geometry.obstacle_meshes.size() == 4);
+  for (std::size_t i = 0; i < 4; ++i) {
+    CHECK(geometry.obstacle_meshes[i].obstacle == i);
+    CHECK(geometry.obstacle_meshes[i].drawn_only);
+    CHECK_FALSE(geometry.obstacle_meshes[i].mesh.triangles.empty());
+  }
+  // A patch of the plane under the bodies; the wall of the room, at time 0.
+  for (Point const& x : geometry.obstacle_meshes[0].mesh.points) CHECK(x[1] == -6);
+  auto const [low, high] = box_of(geometry.obstacle_meshes[1].mesh);
+  CHECK(low == Point{4, -2, -3});
+  CHECK(high == Point{6, 2, 3});
   SceneObstacle const& floor = scene.obstacles[0];
   CHECK(floor.name == "thing");
   CHECK_THAT(floor.where, ContainsSubstring("scene.toml:17: obstacle.thing"));

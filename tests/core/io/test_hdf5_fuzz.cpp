@@ -66,7 +66,11 @@ TEST_CASE("sizes in a damaged result are bounded by the file") {
   const Folder folder;
   const auto path = folder / "result.vtkhdf";
   {
-    ResultMesh const mesh{two_tets(), {0, 1}, {"left", "right"}};
+    ResultMesh const mesh{two_tets(),
+                          {0, 1, 2},
+                          {"left", "right", "floor"},
+                          {{1, 3, 4}},
+                          {ObjectKind::body, ObjectKind::body, ObjectKind::drawn_only}};
     auto writer = ResultWriter::create(path, mesh, 3, ResultWriter::IfExists::refuse);
     for (int k = 0; k < 3; ++k) writer.append(k, mesh.mesh.points, mesh.mesh.points);
   }

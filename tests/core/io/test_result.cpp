@@ -5,6 +5,7 @@
 #include <sys/wait.h>
 #include <unistd.h>
 
+#include <catch2/generators/catch_generators.hpp>
 #include <core/io/io_samples.hpp>
 #include <cstdint>
 #include <fstream>
@@ -17,6 +18,25 @@ using namespace taut::test;
 namespace {
 
 ResultMesh sample() { return {two_tets(), {0, 1}, {"left & right", "größer"}}; }
+
+/// With the triangles of an obstacle and of one that is only drawn; no points are added, so that
+/// the same frames fit.
+ResultMesh mixed_sample() {
+  return {two_tets(),
+          {0, 1, 2, 3, 3},
+          {"left & right", "größer", "bowl", "floor"},
+          {{0, 1, 2}, {1, 3, 4}, {2, 1, 4}},
+          {ObjectKind::body, ObjectKind::body, ObjectKind::obstacle, ObjectKind::drawn_only}};
+}
+
+void check_same(ResultMesh const& a, ResultMesh const& b) {
+  CHECK(a.mesh.points == b.mesh.points);
+  CHECK(a.mesh.tets == b.mesh.tets);
+  CHECK(a.triangles == b.triangles);
+  CHECK(a.object == b.object);
+  CHECK(a.object_names == b.object_names);
+  for (std::size_t i = 0; i < a.object_names.size(); ++i) CHECK(a.kind(i) == b.kind(i));
+}
 
 /// Positions or velocities of frame k of the sample: other numbers everywhere.
 std::vector<Point> frame(int k, double sign) {
@@ -94,10 +114,7 @@ TEST_CASE("frames, mesh and names are read back bitwise") {
   CHECK(writer.frames() == 3);
   check_frames(path, 3);  // while the writer lives
   const ResultReader reader(path);
-  CHECK(reader.mesh().mesh.points == sample().mesh.points);
-  CHECK(reader.mesh().mesh.tets == sample().mesh.tets);
-  CHECK(reader.mesh().object == sample().object);
-  CHECK(reader.mesh().object_names == sample().object_names);
+  check_same(reader.mesh(), sample());
   CHECK(reader.capacity() == 4);
 }
 
@@ -158,6 +175,68 @@ TEST_CASE("a step table that a kill has torn does not stop a resumed run") {
           return 0;
         }) == 0);
   check_frames(path, 4);
+}
+
+TEST_CASE("triangles of obstacles are read back, resumed and grown with the tets") {
+  const Folder folder;
+  const auto path = folder / "result.vtkhdf";
+  {
+    auto writer = ResultWriter::create(path, mixed_sample(), 2, ResultWriter::IfExists::refuse);
+    append_frames(writer, 0, 5);
+  }
+  CHECK(ResultReader(path).capacity() == 8);
+  check_same(ResultReader(path).mesh(), mixed_sample());
+  check_frames(path, 5);
+  {
+    auto writer = ResultWriter::resume(path, mixed_sample(), 3, 20);
+    append_frames(writer, 3, 7);
+  }
+  check_frames(path, 7);
+  check_same(ResultReader(path).mesh(), mixed_sample());
+}
+
+TEST_CASE("a result of other triangles or kinds is not resumed") {
+  const Folder folder;
+  const auto path = folder / "result.vtkhdf";
+  ResultWriter::create(path, mixed_sample(), 2, ResultWriter::IfExists::refuse);
+  ResultMesh other = mixed_sample();
+  SECTION("triangles") { std::swap(other.triangles[0], other.triangles[1]); }
+  SECTION("their objects") { other.object[3] = 2; }
+  SECTION("kinds") { other.object_kind[2] = ObjectKind::drawn_only; }
+  SECTION("no kinds") { other.object_kind.clear(); }
+  check_says(sentence([&] { ResultWriter::resume(path, other, 0, 2); }), {"another mesh"});
+  ResultWriter::resume(path, mixed_sample(), 0, 2);
+}
+
+TEST_CASE("objects and kinds that do not fit the cells are refused") {
+  const Folder folder;
+  const auto begin = [&](ResultMesh const& mesh) {
+    return sentence([&] {
+      ResultWriter::create(folder / "result.vtkhdf", mesh, 2, ResultWriter::IfExists::refuse);
+    });
+  };
+  ResultMesh mesh = mixed_sample();
+  mesh.object.pop_back();
+  check_says(begin(mesh), {"2 tets and 3 triangles have 4 object numbers"});
+  mesh = mixed_sample();
+  mesh.object_kind.pop_back();
+  check_says(begin(mesh), {"4 objects have 3 kinds"});
+}
+
+TEST_CASE("a result from before there were obstacles is read and goes on") {
+  const Folder folder;
+  const auto path = folder / "result.vtkhdf";
+  write_result(path, 2);
+  const hid_t file = H5Fopen(path.c_str(), H5F_ACC_RDWR, H5P_DEFAULT);
+  REQUIRE(file >= 0);
+  REQUIRE(H5Ldelete(file, "taut/object_kind", H5P_DEFAULT) >= 0);
+  H5Fclose(file);
+  check_same(ResultReader(path).mesh(), sample());
+  {
+    auto writer = ResultWriter::resume(path, sample(), 2, 9);
+    append_frames(writer, 2, 6);
+  }
+  check_frames(path, 6);
 }
 
 TEST_CASE("an existing result is never overwritten unasked") {
@@ -232,6 +311,57 @@ TEST_CASE("the layout is VTKHDF's: unstructured grid, static topology, steps") {
   CHECK(info.hdr.nchunks == 1);
   CHECK(info.addr + info.hdr.space.total <= 4096);
   H5Fclose(file);
+}
+
+TEST_CASE("tets and triangles are cells of one grid, the tets first") {
+  const Folder folder;
+  const auto path = folder / "result.vtkhdf";
+  {
+    auto writer = ResultWriter::create(path, mixed_sample(), 3, ResultWriter::IfExists::refuse);
+    append_frames(writer, 0, 2);
+  }
+  const hid_t file = H5Fopen(path.c_str(), H5F_ACC_RDONLY, H5P_DEFAULT);
+  REQUIRE(file >= 0);
+  using List = std::vector<std::int64_t>;
+  CHECK(integers(file, "VTKHDF/NumberOfPoints") == List{5});
+  CHECK(integers(file, "VTKHDF/NumberOfCells") == List{5});
+  CHECK(integers(file, "VTKHDF/NumberOfConnectivityIds") == List{17});
+  CHECK(integers(file, "VTKHDF/Connectivity") ==
+        List{0, 1, 2, 3, 0, 2, 1, 4, 0, 1, 2, 1, 3, 4, 2, 1, 4});
+  CHECK(integers(file, "VTKHDF/Offsets") == List{0, 4, 8, 11, 14, 17});
+  CHECK(integers(file, "VTKHDF/Types") == List{10, 10, 5, 5, 5});
+  CHECK(integers(file, "VTKHDF/CellData/object") == List{0, 1, 2, 3, 3});
+  CHECK(integers(file, "taut/object_kind") == List{0, 0, 1, 2});
+  CHECK(integers(file, "VTKHDF/Steps/PointOffsets") == List{0, 5, 10});
+  CHECK(integers(file, "VTKHDF/Steps/ConnectivityIdOffsets") == List{0, 0, 0});
+  H5Fclose(file);
+  // The sidecar shows the tets: the first 8 of 17 numbers of vertices, the first 2 of 5 objects.
+  check_says(read_file(folder / "result.xdmf"),
+             {"NumberOfElements=\"2\"><DataItem ItemType=\"HyperSlab\" Dimensions=\"8\">",
+              ">0 1 8<", "<DataItem Dimensions=\"17\"", ">0 1 2<", "<DataItem Dimensions=\"5\""});
+}
+
+TEST_CASE("cells that are not tets with triangles behind them are no result") {
+  const Folder folder;
+  const auto path = folder / "result.vtkhdf";
+  ResultWriter::create(path, mixed_sample(), 2, ResultWriter::IfExists::refuse);
+  const auto [name, at, value, reason] = GENERATE(table<char const*, int, int, char const*>(
+      {{"VTKHDF/Types", 0, 5, "not tets with triangles behind them"},
+       {"VTKHDF/Types", 4, 12, "not tets with triangles behind them"},
+       {"VTKHDF/Types", 2, 10, "not those of its points"},
+       {"VTKHDF/CellData/object", 4, 4, "objects that do not exist"},
+       {"VTKHDF/Connectivity", 16, 5, "not those of its points"},
+       {"taut/object_kind", 1, 3, "no kind 3"}}));
+  INFO(name);
+  const hid_t file = H5Fopen(path.c_str(), H5F_ACC_RDWR, H5P_DEFAULT);
+  REQUIRE(file >= 0);
+  std::vector<std::int64_t> values = integers(file, name);
+  values.at(static_cast<std::size_t>(at)) = value;
+  const hid_t dataset = H5Dopen2(file, name, H5P_DEFAULT);
+  CHECK(H5Dwrite(dataset, H5T_NATIVE_INT64, H5S_ALL, H5S_ALL, H5P_DEFAULT, values.data()) >= 0);
+  H5Dclose(dataset);
+  H5Fclose(file);
+  check_says(sentence([&] { ResultReader reader(path); }), {path.string(), "no result", reason});
 }
 
 TEST_CASE("the sidecar names every finished frame's rows") {
