@@ -12,7 +12,7 @@ namespace taut {
 
 /// Options that every command that reads a scene has.
 struct SceneArguments {
-  std::string scene = "drag";  ///< a built-in name or a file
+  std::string scene = "eight_letters";  ///< a built-in name or a file
   SceneChanges changes;
 };
 

@@ -186,7 +186,7 @@ TEST_CASE("every scene loads and builds, in full and small") {
     CHECK(names.count(name) == 1);
 }
 
-TEST_CASE("the default scene and its poses cannot end with inverted elements") {
+TEST_CASE("the dragged letter and its poses cannot end with inverted elements") {
   for (auto const& file : scene_files()) {
     if (!file.stem().string().starts_with("drag") || needs_data(file)) continue;
     INFO(file);
