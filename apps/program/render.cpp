@@ -55,10 +55,13 @@ int render_command(RenderOptions const& options) {
   fs::path const out = options.out.empty() ? result.parent_path() / "pictures" : options.out;
 
   int frames = 0;
+  std::vector<std::string> kinds;
   {
     // The script opens the file itself.
     ResultReader const reader(result);
     frames = static_cast<int>(reader.frames());
+    for (ObjectKind const kind : reader.mesh().object_kind)
+      kinds.push_back(std::to_string(static_cast<int>(kind)));
     if (options.colour == "speed" && !reader.has_velocities()) {
       throw Error("{}: the result has no velocities: choose --colour displacement",
                   result.string());
@@ -70,6 +73,8 @@ int render_command(RenderOptions const& options) {
     require_absent(out / fmt::format("frame_{:05}.png", frame), options.force);
     arguments.push_back(std::to_string(frame));
   }
+  arguments.push_back("--kinds");
+  arguments.insert(arguments.end(), kinds.begin(), kinds.end());
   arguments.insert(arguments.end(),
                    {"--colour", options.colour, "--size", std::to_string(options.width),
                     std::to_string(options.height), "--view"});

@@ -166,8 +166,9 @@ class Picture:
             say(f"looking at frame {frame}", done, len(drawn))
             frames.load(frame)
             bodies.append(extremes(frames.bodies.mesh.points))
-            if frames.obstacles:
-                framed.append(frames.obstacles.mesh.points)
+            if frames.obstacles and not (framed and np.array_equal(framed[-1],
+                                                                   frames.obstacles.mesh.points)):
+                framed.append(np.array(frames.obstacles.mesh.points))
             if self.colour != "object":
                 self.top = max(self.top, frames.field(self.colour).max())
         bodies = np.concatenate(bodies)
@@ -293,7 +294,7 @@ class Picture:
             self.base = 255 * matplotlib.colormaps["viridis"](values)[:, :3]
         self.paint(body, self.base, 0.3)
         if frames.room:
-            self.paint(frames.room.mesh, rgb(WALL), 0.3)
+            self.paint(frames.room.mesh, rgb(WALL), 0.6)
         self.draw_planes()
         self.plotter.render()
         image = Image.fromarray(self.plotter.screenshot(return_img=True))
