@@ -10,7 +10,10 @@
 // pair that is closer than its a at x if m <= reach. Pairs of one body and pairs of two have an m
 // and a reach of their own: bodies that fly at each other make no candidates within themselves.
 // reach = 2 slack lasts until some vertex has moved by more than the slack, or longer: what all do
-// together does not count, a scene in free fall is searched once. Neighbours in one body, whose
+// together does not count, a scene in free fall is searched once. Where a motion goes further than
+// that, boxes around the paths of the primitives say which pairs may meet on the way, and for each
+// pair its own relative motion takes the place of the reach: few pairs move as far against each
+// other as the two that do so most. Neighbours in one body, whose
 // boxes overlap for ever, are no candidates unless they come to act: a body far from all others has
 // none.
 //
@@ -50,20 +53,36 @@ struct KeepOrigin {
   }
 };
 
-/// Keeps pairs that may act, or be half of dhat apart, once their distance has fallen by `reach`.
-template <class S>
+/// Keeps pairs that may act, or be half of dhat apart, once their distance has fallen by `reach`,
+/// or in the course of `motion`.
+template <class Precision, class S>
 struct WithinReach {
   Activation<S> activation;
   Displacement reach;
+  Motion<Precision, S> motion;
 
   /// Compiled once, as what contact_kernels.hpp computes: which pairs are candidates must not
   /// depend on the number of threads.
   [[gnu::noinline]] KOKKOS_FUNCTION bool operator()(PairKind kind, int const (&v)[4],
                                                     Vec3<double> const (&y)[4]) const {
     double const low = distance_below(kind, y);
-    double const far = activation.one_body(v) ? reach.within : reach.between;
+    double far = activation.one_body(v) ? reach.within : reach.between;
+    if (motion.moves()) far = Kokkos::max(far, relative_motion(v, y));
     if (!(low < activation.dhat + far)) return false;
     return low < Kokkos::max(activation(kind, v), 0.5 * activation.dhat) + far;
+  }
+  /// Of the vertices of a pair against each other, and what storing their ends may add.
+  KOKKOS_FUNCTION double relative_motion(int const (&v)[4], Vec3<double> const (&y)[4]) const {
+    constexpr double epsilon_x = Kokkos::Experimental::epsilon_v<typename Precision::position>;
+    constexpr double epsilon = Kokkos::Experimental::epsilon_v<typename Precision::real>;
+    Vec3<double> step[4];
+    double error = 0, longest = 0;
+    for (int a = 0; a < 4; ++a) {
+      step[a] = motion.step(v[a]);
+      error += 4 * epsilon * norm(step[a]) + 2 * epsilon_x * norm(y[a] + step[a]);
+      for (int b = 0; b < a; ++b) longest = Kokkos::max(longest, norm(step[a] - step[b]));
+    }
+    return longest + error;
   }
   /// The distance, less the round-off of computing it.
   KOKKOS_FUNCTION static double distance_below(PairKind kind, Vec3<double> const (&y)[4]) {
@@ -72,6 +91,19 @@ struct WithinReach {
     // As for CloserThan.
     constexpr double budget = 16 * Kokkos::Experimental::epsilon_v<double>;
     return closest_points(kind, y).distance - budget * size;
+  }
+};
+
+/// Raises to the longest step of a vertex.
+template <class Precision, class S>
+struct LongestStep {
+  SurfaceViews<S> surface;
+  Motion<Precision, S> motion;
+  KOKKOS_FUNCTION void operator()(int i, double& longest) const {
+    longest = Kokkos::max(longest, length(i));
+  }
+  [[gnu::noinline]] KOKKOS_FUNCTION double length(int i) const {
+    return norm(motion.step(surface.vertex(i)));
   }
 };
 
@@ -95,7 +127,7 @@ struct LeastClearance {
     if (one != one_body) return other;
     Vec3<double> y[4];
     gather(v, x, y);
-    double const low = WithinReach<S>::distance_below(kind, y);
+    double const low = WithinReach<Fp64, S>::distance_below(kind, y);
     distance(k) = pair_length(one, FoundDistances<S>::shaded(low, y));
     return low - activation(kind, v);
   }
@@ -175,14 +207,24 @@ private:
     for_each<Space>("candidate_origin", surface.vertices(),
                     kernels::KeepOrigin<Precision, Space>{surface, motion.x, origin_});
     moved_ = displacements_.measure(motion, origin_);
-    reach_ = {moved_.within + 2 * slack_, moved_.between + 2 * slack_};
-    double const farthest = displacements_.bodies() > 1 ? reach_.between : reach_.within;
-    search_.find(at_start, activation_.dhat + farthest, candidates_);
-    candidates_.keep(kernels::WithinReach<Space>{activation_, reach_}, motion.x);
+    double const farthest = displacements_.bodies() > 1 ? moved_.between : moved_.within;
+    // What goes far with all others has a long path and little to meet on it.
+    bool const paths = farthest > 2 * slack_ && longest_step(motion) <= 2 * farthest;
+    reach_ = paths ? Displacement{2 * slack_, 2 * slack_}
+                   : Displacement{moved_.within + 2 * slack_, moved_.between + 2 * slack_};
+    double const radius = activation_.dhat + 2 * slack_ + (paths ? 0 : farthest);
+    Motion<Precision, Space> const& along = paths ? motion : at_start;
+    search_.find(along, radius, candidates_);
+    candidates_.keep(kernels::WithinReach<Precision, Space>{activation_, reach_, along}, motion.x);
     clear_for_ = reach_;
     clearance(candidates_.point_triangle, motion.x, triangle_distance_);
     clearance(candidates_.edge_edge, motion.x, edge_distance_);
     complete_ = true;
+  }
+
+  double longest_step(Motion<Precision, Space> const& motion) const {
+    return maximum<Space>("candidate_step", search_.surface().vertices(), 0.0,
+                          kernels::LongestStep<Precision, Space>{search_.surface(), motion});
   }
 
   /// Notes the distances of a list and lowers clear_for_.
@@ -210,7 +252,7 @@ private:
   VectorField<double, Space> origin_;
   Candidates<Space> candidates_;
   Array<float, Space> triangle_distance_, edge_distance_;
-  bool complete_ = false;  ///< for what has moved by reach_ at most
+  bool complete_ = false;  ///< for the last search's motion, and what has moved by reach_ at most
   Displacement reach_;
   Displacement clear_for_;  ///< nothing acts until so much has moved
   Displacement moved_;      ///< in the motion that was last asked for
