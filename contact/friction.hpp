@@ -1,7 +1,8 @@
 // Friction: a swept term of the potential,
 //
-//   V(x) = Sum over contacts mu lambda e f(|u| / e),   u = (1 - n n') (Sum_a c_a (x_a - x_a^t) -
-//   motion),
+//   V(x) = Sum over contacts mu lambda e f(|u| / e),   e = eps_v h,
+//
+//   u = (1 - n n') (Sum_a c_a (x_a - x_a^t) - motion),
 //
 // Coulomb's law, smoothed (friction_law.hpp), of contacts that are lagged: the coefficients c, the
 // normals n and the normal forces lambda are those at the positions that it was last told of,
@@ -65,7 +66,8 @@ public:
 
   struct Params {
     /// eps_v, m/s: what is slower sticks and creeps. Else 1e-3 of the diagonal of the box around
-    /// all vertices at rest, per second.
+    /// all vertices at rest, per second. (In BDF2 the step counts as 2/3 h: what sticks is slower
+    /// by as much.)
     std::optional<double> stick_speed = {};
   };
 

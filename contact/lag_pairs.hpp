@@ -17,7 +17,9 @@ struct LagPair {
   typename SurfaceViews<S>::Indices object;
   FrictionMatrix<S> mu;
 
-  KOKKOS_FUNCTION bool operator()(int k, LaggedContact<Real>& to) const { return lag(k, to); }
+  KOKKOS_FUNCTION bool operator()(int k, LaggedContact<Real>& to) const {
+    return !pairs.idle(k) && lag(k, to);
+  }
   [[gnu::noinline]] KOKKOS_FUNCTION bool lag(int k, LaggedContact<Real>& to) const {
     auto const s = pairs.template evaluate<Pair>(k, x);
     if (!(s.at.distance < s.activation)) return false;

@@ -46,11 +46,11 @@ TEST_CASE("a block on a slope slips where tan(theta) > mu, and creeps as the law
   CHECK_THAT(scene.mean(scene.state.v)[2], WithinAbs(0, 0.1 * speed));
   if (mu < 0.5) {
     double const acceleration = g * (std::sin(angle) - mu * std::cos(angle));
-    CHECK_THAT((after - before) / (steps * h), WithinRel(acceleration, 0.02));
+    CHECK_THAT((after - before) / (steps * h), WithinAbs(acceleration, 1e-3 * g));
   } else {
     double const creep = speed * (1 - std::sqrt(1 - 0.5 / mu));
+    CHECK(before < speed);
     CHECK_THAT(after, WithinRel(creep, 0.02));
-    CHECK_THAT(before, WithinRel(creep, 0.02));
   }
 }
 
@@ -124,19 +124,21 @@ TEST_CASE("without friction, and without contact, nothing holds a block", "[fric
 }
 
 TEST_CASE("friction serves Newton's method, whose matrix follows its contacts", "[friction]") {
-  double const mu = 0.6, angle = std::atan(0.5), speed = 0.01;
-  SlidingBlock scene({.mu = mu, .stick_speed = speed});
-  SlidingBlock::Stepper settle({.stop = {.tolerance = 1e-5}});
-  run(scene, settle, 30);
-  scene.tilt(angle);
-  ImplicitEuler<Newton<>> stepper;
+  using Minimiser = Newton<AssembledPcg, BlockJacobi, SufficientDecrease, DecrementWindow, Fp64>;
+  SlidingBlock::Params const params{.mu = 0.6};
+  SlidingBlock scene(params), other(params);
+  SlidingBlock::Stepper stepper({.stop = {.tolerance = 1e-5}});
+  ImplicitEuler<Minimiser> newton({.stop = {.tolerance = 1e-5}});
+  for (SlidingBlock* s : {&scene, &other}) s->throw_with({0.3, 0, 0.1});
   for (int step = 0; step < 12; ++step) {
-    auto const report = stepper.step(scene.potential, scene.state, h);
+    run(scene, stepper, 1);
+    auto const report = newton.step(other.potential, other.state, h);
     CAPTURE(step, to_string(report.stop), report.iterations);
     REQUIRE(report.converged());
   }
-  double const creep = speed * (1 - std::sqrt(1 - 0.5 / mu));
-  CHECK_THAT(scene.mean(scene.state.v)[0], WithinRel(creep, 0.05));
+  Point const v = scene.mean(scene.state.v), w = other.mean(other.state.v);
+  CHECK(v[0] < 0.25);
+  for (int c = 0; c < 3; ++c) CHECK_THAT(w[c], WithinAbs(v[c], 2e-3));
 }
 
 TEST_CASE("a step of no pass is refused", "[friction]") {
