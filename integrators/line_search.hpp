@@ -50,7 +50,12 @@ public:
   double slope() const { return slope_; }
   /// p'Hp at the beginning; asked for once, before the first move. NaN until then.
   double curvature() {
-    if (std::isnan(form_)) form_ = objective_.quadratic_form(x_, fields_.direction);
+    if (!std::isnan(form_)) return form_;
+    if constexpr (CertifyingObjective<E>) {
+      form_ = objective_.quadratic_form(x_, fields_.direction, certified_);
+    } else {
+      form_ = objective_.quadratic_form(x_, fields_.direction);
+    }
     return form_;
   }
   double known_curvature() const { return form_; }
@@ -73,10 +78,10 @@ public:
   /// Largest step along p, or -p if `backwards`, up to `at_most` that is valid; to be asked for
   /// before the first move.
   double max_length(double at_most, bool backwards) {
-    if (!backwards) return objective_.max_step(x_, fields_.direction, at_most);
+    if (!backwards) return max_step(at_most);
     kernels::Reverse<P, S> const reverse{fields_.direction};
     for_each<S>("reverse", objective_.size(), reverse);
-    double const length = objective_.max_step(x_, fields_.direction, at_most);
+    double const length = max_step(at_most);
     for_each<S>("reverse", objective_.size(), reverse);
     return length;
   }
@@ -118,12 +123,22 @@ public:
   }
 
 private:
+  /// Along fields.direction, which is p or -p.
+  double max_step(double at_most) {
+    if constexpr (CertifyingObjective<E>) {
+      return objective_.max_step(x_, fields_.direction, at_most, certified_);
+    } else {
+      return objective_.max_step(x_, fields_.direction, at_most);
+    }
+  }
+
   E& objective_;
   Positions const& x_;
   DescentFields<P, S> const& fields_;
   LocalMatrices<P, S> const curvature_;
   double slope_, energy_unit_, negligible_;
   double form_ = std::numeric_limits<double>::quiet_NaN();
+  double certified_ = 0;  ///< how far along p or -p is known to be valid, where p'Hp has told
   double length_ = 0;
   bool moved_ = false;
 };

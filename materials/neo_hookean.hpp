@@ -21,7 +21,7 @@ struct NeoHookean {
   KOKKOS_FORCEINLINE_FUNCTION static T change(Lame<T> const& m, Invariants<T> const& i,
                                               Invariants<T> const& d) {
     T const log_j = log(i.J);
-    T const d_log = -log1p(-d.J / i.J);
+    T const d_log = -log1p(-d.J * (T(1) / i.J));  // the reciprocal is known from the stress
     return T(0.5) * m.mu * d.I2 + d_log * (m.lambda * (log_j - T(0.5) * d_log) - m.mu);
   }
   template <class T>

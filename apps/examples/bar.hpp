@@ -2,10 +2,10 @@
 #pragma once
 
 #include <taut/core/fem/body.hpp>
-#include <taut/core/fem/elastic_tets.hpp>
 #include <taut/core/fem/shapes.hpp>
 #include <taut/core/potential/potential.hpp>
 #include <taut/integrators/time_stepper.hpp>
+#include <taut/presets/elastic.hpp>
 
 #include <algorithm>
 #include <cstdio>

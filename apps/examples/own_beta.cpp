@@ -2,8 +2,6 @@
 #include "bar.hpp"
 
 #include <taut/integrators/ncg.hpp>
-#include <taut/materials/elastic.hpp>
-#include <taut/materials/stable_neo_hookean.hpp>
 
 struct DaiYuanHybrid {
   static constexpr char const* name = "hsdy";

@@ -3,7 +3,6 @@
 #include "bar.hpp"
 
 #include <taut/integrators/ncg.hpp>
-#include <taut/materials/elastic.hpp>
 
 struct QuarticVolume {
   static constexpr char const* name = "quartic_volume";

@@ -4,8 +4,6 @@
 
 #include <taut/core/potential/stencil_term.hpp>
 #include <taut/integrators/ncg.hpp>
-#include <taut/materials/elastic.hpp>
-#include <taut/materials/stable_neo_hookean.hpp>
 
 #include <cmath>
 

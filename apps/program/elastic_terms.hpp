@@ -3,9 +3,8 @@
 #pragma once
 
 #include <taut/apps/program/scene.hpp>
-#include <taut/core/fem/elastic_tets.hpp>
 #include <taut/core/potential/any_terms.hpp>
-#include <taut/materials/models.hpp>
+#include <taut/presets/elastic.hpp>
 
 #include <string_view>
 

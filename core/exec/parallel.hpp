@@ -35,16 +35,6 @@ void for_each(char const* name, int n, Functor const& functor) {
                        functor);
 }
 
-/// Kokkos::parallel_reduce into a number on the host, for reductions whose order is free.
-template <class S, template <class, class> class Join, class T, class Policy, class Functor>
-T reduce(char const* name, Policy const& policy, Functor const& functor) {
-  T result;
-  Kokkos::parallel_reduce(label(name), policy, functor,
-                          Join<T, Kokkos::HostSpace>(Kokkos::View<T, Kokkos::HostSpace>(&result)));
-  S::instance().fence(label(name));
-  return result;
-}
-
 namespace kernels {
 
 /// What a functor makes of `start` over one run of a loop.
@@ -62,16 +52,27 @@ struct FoldRun {
   }
 };
 
-/// Folds [0, n) in up to `runs` runs on the host, on the stack: Kokkos would make a string for the
-/// name of a fence in each reduction.
-template <class S, class T, class Functor, class Join>
-T fold(char const* name, int n, T start, Functor const& functor, Join const& join) {
-  constexpr int runs = 256;
-  T part[runs];
-  int const length = n / runs + 1, count = n / length + (n % length > 0);
-  for_each<S>(name, count, FoldRun<T, Functor>{functor, start, part, n, length});
-  S::instance().fence(label(name));
-  for (int r = 0; r < count; ++r) start = join(start, part[r]);
+/// What `functor(i, value)` makes of `start` over [0, n), in an order that is free: `Join` is the
+/// reducer of Kokkos that puts two values together. On the host in up to `runs` runs on the stack:
+/// Kokkos would make a string for the name of a fence in each reduction.
+template <class S, template <class, class> class Join, class T, class Functor>
+T fold(char const* name, int n, T start, Functor const& functor) {
+  Join<T, Kokkos::HostSpace> const result(start);
+  if constexpr (S::on_host) {
+    constexpr int runs = 256;
+    T part[runs];
+    int const length = n / runs + 1, count = n / length + (n % length > 0);
+    for_each<S>(name, count, FoldRun<T, Functor>{functor, start, part, n, length});
+    S::instance().fence(label(name));
+    for (int r = 0; r < count; ++r) result.join(start, part[r]);
+  } else if (n > 0) {
+    T folded;
+    Kokkos::parallel_reduce(
+        label(name), Kokkos::RangePolicy<typename S::execution>(S::instance(), 0, n), functor,
+        Join<T, Kokkos::HostSpace>(Kokkos::View<T, Kokkos::HostSpace>(&folded)));
+    S::instance().fence(label(name));
+    result.join(start, folded);
+  }
   return start;
 }
 
@@ -81,27 +82,13 @@ T fold(char const* name, int n, T start, Functor const& functor, Join const& joi
 /// `floor` if n = 0. A maximum is exact, so its order is free.
 template <class S, class T, class Functor>
 T maximum(char const* name, int n, T floor, Functor const& functor) {
-  if constexpr (S::on_host) {
-    return kernels::fold<S>(name, n, floor, functor,
-                            [](T const& a, T const& b) { return Kokkos::max(a, b); });
-  } else {
-    if (n == 0) return floor;
-    Kokkos::RangePolicy<typename S::execution> const all(S::instance(), 0, n);
-    return Kokkos::max(reduce<S, Kokkos::Max, T>(name, all, functor), floor);
-  }
+  return kernels::fold<S, Kokkos::Max>(name, n, floor, functor);
 }
 
 /// As `maximum`, for the smallest.
 template <class S, class T, class Functor>
 T minimum(char const* name, int n, T ceiling, Functor const& functor) {
-  if constexpr (S::on_host) {
-    return kernels::fold<S>(name, n, ceiling, functor,
-                            [](T const& a, T const& b) { return Kokkos::min(a, b); });
-  } else {
-    if (n == 0) return ceiling;
-    Kokkos::RangePolicy<typename S::execution> const all(S::instance(), 0, n);
-    return Kokkos::min(reduce<S, Kokkos::Min, T>(name, all, functor), ceiling);
-  }
+  return kernels::fold<S, Kokkos::Min>(name, n, ceiling, functor);
 }
 
 /// K sums that are accumulated side by side.

@@ -8,7 +8,7 @@
 // they capture anew after every store.
 #pragma once
 
-#include <taut/core/fem/patch_sweep.hpp>
+#include <taut/core/fem/inversion_sweeps.hpp>
 
 namespace taut::kernels {
 
@@ -177,7 +177,9 @@ struct ProductSweep : PatchSweep<S, typename Precision::real> {
 /// What a sweep that ends in one number per patch computes.
 enum class Measure { energy, change, form };
 
-/// Energy at x, energy change E(x + alpha p) - E(x), or p' H p; one number per patch.
+/// Energy at x, energy change E(x + alpha p) - E(x), or p' H p; one number per patch. Where the
+/// material forbids inversion, p' H p comes with a certificate of how far x + t p has none: both
+/// need F and dF.
 template <class S, class Precision, class Material, Measure measure>
 struct MeasureSweep : PatchSweep<S, typename Precision::real> {
   using Real = typename Precision::real;
@@ -189,6 +191,9 @@ struct MeasureSweep : PatchSweep<S, typename Precision::real> {
   VectorField<Real, S> p;
   Real alpha;
   Kokkos::View<typename Precision::sum*, typename S::memory> total;
+  Kokkos::View<double*, typename S::memory> certified;  ///< per patch, if `certifies`
+
+  static constexpr bool certifies = measure == Measure::form && !Material::allows_inversion;
 
   std::size_t scratch_bytes() const {
     auto const& v = this->patches;
@@ -207,6 +212,10 @@ struct MeasureSweep : PatchSweep<S, typename Precision::real> {
     team.team_barrier();
     auto const lame = Material::template cast<T>(materials(v.material(patch)));
     auto const elements = this->elements(patch);
+    [[maybe_unused]] InversionCertificate<T> const certificate(
+        certifies ? this->largest(team, patch, local_x) : Real(0),
+        certifies ? this->largest(team, patch, local_p) : Real(0));
+    [[maybe_unused]] T square_length(Kokkos::Experimental::finite_max_v<Real>);
     auto const body = [&](int g) __attribute__((always_inline)) {
       Mat3<T> const B = elements.inverse_rest(g);
       Mat3<T> F = elements.edges(g, local_x.data()) * B;
@@ -221,6 +230,9 @@ struct MeasureSweep : PatchSweep<S, typename Precision::real> {
           density = Material::change(lame, Material::evaluate(lame, F), dF);
         } else {
           density = Material::quadratic(Material::evaluate(lame, F), dF);
+          if constexpr (certifies) {
+            square_length = min(square_length, certificate.square_length(B, F, dF));
+          }
         }
       }
       energies(g) = sum_lanes(T(elements.volume(g) * density));
@@ -228,6 +240,10 @@ struct MeasureSweep : PatchSweep<S, typename Precision::real> {
     Kokkos::parallel_for(Kokkos::TeamThreadRange(team, this->groups(patch)), body);
     team.team_barrier();
     this->add_up(team, patch, energies, total);
+    if constexpr (certifies) {
+      double const length = this->smallest(team, square_length);
+      Kokkos::single(Kokkos::PerTeam(team), [&]() { certified(patch) = length; });
+    }
   }
 };
 

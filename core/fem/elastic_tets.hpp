@@ -8,7 +8,6 @@
 #include <taut/core/potential/term.hpp>
 #include <taut/core/report/error.hpp>
 
-#include <algorithm>
 #include <limits>
 
 namespace taut {
@@ -36,84 +35,59 @@ public:
   /// some tets of a scene. `material_of_tet[t]` indexes `materials`. Throws Error if an index is
   /// out of range.
   ElasticTets(TetMesh const& rest, std::vector<MaterialParameters> const& materials,
-              std::vector<int> const& material_of_tet, SweepParams const& params = {})
-      : params_(params), materials_(to_space<Space>("materials", materials)) {
-    check_indices(rest, materials.size(), material_of_tet);
-    Patches const host = make_patches(
-        rest.tets, material_of_tet, static_cast<int>(rest.points.size()), lanes, params.patch_size);
-    std::vector<double> shapes(10 * host.tet.size());
-    for (std::size_t e = 0; e < host.tet.size(); ++e) {
-      RestShape const shape = rest_shape(rest.points, rest.tets[host.tet[e]]);
-      for (int k = 0; k < 9; ++k) shapes[10 * e + k] = shape.B.a[k];
-      shapes[10 * e + 9] = host.padding[e] ? 0 : shape.W;
-    }
-    patches_ = copy_patches<Space, Real>(host, shapes);
-    for (auto const& colour : host.colours) {
-      colours_.push_back(to_space<Space>("patch_colour", colour));
-    }
-    vertices_.reserve(4 * rest.tets.size());
-    for (Tet const& tet : rest.tets) vertices_.insert(vertices_.end(), tet.begin(), tet.end());
-    reducer_ = Reducer<Space, Sum>::of_partials(patches_.count);
-    certified_ = Scratch("elastic_certified", patches_.count);
-  }
+              std::vector<int> const& material_of_tet, SweepParams const& params = {});
 
   ElasticTets(TetMesh const& rest, MaterialParameters const& material, SweepParams const& p = {})
       : ElasticTets(rest, {material}, std::vector<int>(rest.tets.size(), 0), p) {}
 
   double value(Positions const& x, double scale) const {
-    return scale * measure<kernels::Measure::energy>("elastic_energy", x, Vectors(), 0);
+    return scale * measure(kernels::Measure::energy, x, Vectors(), 0);
   }
   double change(Positions const& x, Vectors const& p, double alpha, double scale) const {
-    return scale * measure<kernels::Measure::change>("elastic_change", x, p, alpha);
+    return scale * measure(kernels::Measure::change, x, p, alpha);
   }
   double quadratic_form(Positions const& x, Vectors const& p, double scale) const {
-    return scale * measure<kernels::Measure::form>("elastic_quadratic_form", x, p, 0);
+    return scale * measure(kernels::Measure::form, x, p, 0);
+  }
+  /// Lowers `certified` to a length that inverts no element, where the material forbids that.
+  double quadratic_form(Positions const& x, Vectors const& p, double scale,
+                        double& certified) const {
+    double const form = quadratic_form(x, p, scale);
+    if constexpr (!Material::allows_inversion) certified = smallest_bound(certified);
+    return form;
   }
 
   void add_gradient(Positions const& x, double scale, FixedMask<Space> const& fixed,
                     Vectors const& g) const {
-    sweep<kernels::Curvature::none>(x, Vectors(), false, 0, scale, fixed, g, g);
+    sweep(x, nullptr, 0, scale, {{}, fixed, g, {}, {}});
   }
   void add_gradient(Positions const& x, double scale, FixedMask<Space> const& fixed,
                     Vectors const& g, Vectors const& diagonal) const {
-    sweep<kernels::Curvature::diagonal>(x, Vectors(), false, 0, scale, fixed, g, diagonal);
+    sweep(x, nullptr, 0, scale, {{}, fixed, g, diagonal, {}});
   }
   void add_gradient(Positions const& x, double scale, FixedMask<Space> const& fixed,
                     Vectors const& g, Blocks const& blocks) const {
-    sweep<kernels::Curvature::blocks>(x, Vectors(), false, 0, scale, fixed, g, blocks);
+    sweep(x, nullptr, 0, scale, {{}, fixed, g, {}, blocks});
   }
   double add_gradient_after(Positions const& x, Vectors const& p, double alpha, double scale,
                             FixedMask<Space> const& fixed, Vectors const& g) const {
-    return sweep<kernels::Curvature::none>(x, p, true, alpha, scale, fixed, g, g);
+    return sweep(x, &p, alpha, scale, {{}, fixed, g, {}, {}});
   }
   double add_gradient_after(Positions const& x, Vectors const& p, double alpha, double scale,
                             FixedMask<Space> const& fixed, Vectors const& g,
                             Vectors const& diagonal) const {
-    return sweep<kernels::Curvature::diagonal>(x, p, true, alpha, scale, fixed, g, diagonal);
+    return sweep(x, &p, alpha, scale, {{}, fixed, g, diagonal, {}});
   }
   double add_gradient_after(Positions const& x, Vectors const& p, double alpha, double scale,
                             FixedMask<Space> const& fixed, Vectors const& g,
                             Blocks const& blocks) const {
-    return sweep<kernels::Curvature::blocks>(x, p, true, alpha, scale, fixed, g, blocks);
+    return sweep(x, &p, alpha, scale, {{}, fixed, g, {}, blocks});
   }
 
   void add_product(Positions const& x, Vectors const& p, double scale,
-                   FixedMask<Space> const& fixed, Vectors const& hp) const {
-    using Kernel = kernels::ProductSweep<Space, Precision, Material>;
-    Kernel const kernel{{patches_},          materials_, x, p, static_cast<Real>(scale),
-                        output<3>(fixed, hp)};
-    run("elastic_product", kernel);
-    gather<3>(kernel.output);
-  }
-
+                   FixedMask<Space> const& fixed, Vectors const& hp) const;
   void add_to(Matrix const& matrix, Positions const& x, double scale,
-              FixedMask<Space> const& fixed) const {
-    for (auto const& colour : colours_) {
-      using Kernel = kernels::AssembleColour<Space, Precision, Material, Matrix>;
-      for_each<Space>("elastic_assemble", static_cast<int>(colour.extent(0)),
-                      Kernel{patches_, materials_, colour, x, fixed, matrix, scale});
-    }
-  }
+              FixedMask<Space> const& fixed) const;
 
   double max_step(Positions const& x, Vectors const& p, double at_most) const {
     if constexpr (Material::allows_inversion) {
@@ -121,6 +95,9 @@ public:
     } else {
       return step_to_inversion(x, p, at_most, true);
     }
+  }
+  double max_step(Positions const& x, Vectors const& p, double at_most, double certified) const {
+    return at_most <= certified ? at_most : max_step(x, p, at_most);
   }
   double max_prescribed_step(Positions const& x, Vectors const& p, double at_most) const {
     return step_to_inversion(x, p, at_most, !Material::allows_inversion);
@@ -131,21 +108,26 @@ public:
 private:
   using Sum = typename Precision::sum;
   using Scratch = Kokkos::View<Real*, typename Space::memory>;
+  using Bounds = Kokkos::View<double*, typename Space::memory>;
+  using Output = kernels::SweepOutput<Space, Real>;
 
-  static void check_indices(TetMesh const& rest, std::size_t materials,
-                            std::vector<int> const& material_of_tet) {
-    if (material_of_tet.size() != rest.tets.size())
-      throw Error("ElasticTets: {} tets but {} entries in material_of_tet", rest.tets.size(),
-                  material_of_tet.size());
-    for (std::size_t t = 0; t < rest.tets.size(); ++t) {
-      int const m = material_of_tet[t];
-      if (m < 0 || std::size_t(m) >= materials)
-        throw Error("ElasticTets: tet {} has material {} of {}", t, m, materials);
-      for (int v : rest.tets[t]) {
-        if (v < 0 || std::size_t(v) >= rest.points.size())
-          throw Error("ElasticTets: tet {} has vertex {} of {}", t, v, rest.points.size());
-      }
-    }
+  // What runs kernels is defined below, and not inline: where a preset is compiled in the library
+  // (presets/), no kernel is compiled for its users.
+  double measure(kernels::Measure what, Positions const& x, Vectors const& p, double alpha) const;
+  /// Gradient and the curvature that `to` has a field for; if there is a `p`, after a step along
+  /// it, of which it returns the change of energy.
+  double sweep(Positions const& x, Vectors const* p, double alpha, double scale, Output to) const;
+  double step_to_inversion(Positions const& x, Vectors const& p, double at_most, bool strict) const;
+  /// Of the patches, as the last sweep has left them; `ceiling` if that is less.
+  double smallest_bound(double ceiling) const;
+
+  template <kernels::Measure what>
+  double measured(char const* name, Positions const& x, Vectors const& p, double alpha) const {
+    using Kernel = kernels::MeasureSweep<Space, Precision, Material, what>;
+    run(name,
+        Kernel{
+            {patches_}, materials_, x, p, static_cast<Real>(alpha), reducer_.partials(), bounds_});
+    return reducer_.template finish<1>(name, patches_.count)[0];
   }
 
   typename Space::team_policy policy(std::size_t scratch_bytes) const {
@@ -154,7 +136,6 @@ private:
     if (scratch_bytes > 0) p.set_scratch_size(0, Kokkos::PerTeam(static_cast<int>(scratch_bytes)));
     return p;
   }
-
   template <class Kernel>
   void run(char const* name, Kernel const& kernel) const {
     if (patches_.count == 0) return;
@@ -162,68 +143,9 @@ private:
   }
 
   /// Rows of `numbers` for the vertices that patches share; grow when first asked for, then stay.
+  void provide_partial(Output& to, int numbers) const;
   template <int numbers>
-  kernels::SweepOutput<Space, Real> output(FixedMask<Space> const& fixed, Vectors const& g) const {
-    if (fixed.extent_int(0) != patches_.vertices)
-      throw Error("ElasticTets: the mesh has {} vertices, the potential {} unknowns",
-                  patches_.vertices, fixed.extent(0));
-    std::size_t const needed = std::size_t(numbers) * patches_.shared_rows;
-    if (partial_.extent(0) < needed) {
-      partial_ = Scratch(
-          Kokkos::view_alloc(Kokkos::WithoutInitializing, std::string("elastic_partial")), needed);
-    }
-    return {partial_, fixed, g, {}, {}};
-  }
-
-  /// The cheap sweep clears nearly all patches; the exact one looks at those that it cannot.
-  double step_to_inversion(Positions const& x, Vectors const& p, double at_most,
-                           bool strict) const {
-    if (patches_.count == 0) return at_most;
-    using Certificate = kernels::CertificateSweep<Space, Precision>;
-    Certificate const certificate{{patches_}, x, p, certified_};
-    if (reduce<Space, Kokkos::Min, double>(
-            "elastic_certificate", policy(certificate.scratch_bytes()), certificate) >= at_most) {
-      return at_most;
-    }
-    using Inversion = kernels::InversionSweep<Space, Precision>;
-    double const smallest = reduce<Space, Kokkos::Min, double>(
-        "elastic_max_step", policy(0), Inversion{patches_, x, p, certified_, at_most, strict});
-    // Kokkos' identity of the minimum is the largest finite number.
-    return smallest < std::numeric_limits<double>::max() ? std::min(smallest, at_most) : at_most;
-  }
-
-  template <kernels::Measure what>
-  double measure(char const* name, Positions const& x, Vectors const& p, double alpha) const {
-    using Kernel = kernels::MeasureSweep<Space, Precision, Material, what>;
-    run(name, Kernel{{patches_}, materials_, x, p, static_cast<Real>(alpha), reducer_.partials()});
-    return reducer_.template finish<1>(name, patches_.count)[0];
-  }
-
-  template <kernels::Curvature curvature, class CurvatureField>
-  double sweep(Positions const& x, Vectors const& p, bool after_step, double alpha, double scale,
-               FixedMask<Space> const& fixed, Vectors const& g, CurvatureField const& c) const {
-    constexpr int numbers = 3 + static_cast<int>(curvature);
-    auto to = output<numbers>(fixed, g);
-    if constexpr (curvature == kernels::Curvature::diagonal) to.diagonal = c;
-    if constexpr (curvature == kernels::Curvature::blocks) to.blocks = c;
-    kernels::GradientSweep<Space, Precision, Material> const kernel{{patches_},
-                                                                    materials_,
-                                                                    curvature,
-                                                                    after_step,
-                                                                    x,
-                                                                    p,
-                                                                    static_cast<Real>(alpha),
-                                                                    static_cast<Real>(scale),
-                                                                    to,
-                                                                    reducer_.partials()};
-    run("elastic_gradient", kernel);
-    gather<numbers>(to);
-    if (!after_step) return 0;
-    return reducer_.template finish<1>("elastic_change", patches_.count)[0];
-  }
-
-  template <int numbers>
-  void gather(kernels::SweepOutput<Space, Real> const& to) const {
+  void gather(Output const& to) const {
     for_each<Space>("elastic_gather", patches_.shared.extent_int(0),
                     kernels::GatherShared<Space, Real, numbers>{patches_, to});
   }
@@ -239,7 +161,128 @@ private:
   std::vector<int> vertices_;
   Reducer<Space, Sum> reducer_;
   mutable Scratch partial_;
-  Scratch certified_;  ///< per patch, see CertificateSweep
+  Bounds bounds_;  ///< what the sweep of the moment says of each patch
 };
+
+template <ElementMaterial Material, class Precision, class Space>
+ElasticTets<Material, Precision, Space>::ElasticTets(
+    TetMesh const& rest, std::vector<MaterialParameters> const& materials,
+    std::vector<int> const& material_of_tet, SweepParams const& params)
+    : params_(params), materials_(to_space<Space>("materials", materials)) {
+  if (material_of_tet.size() != rest.tets.size())
+    throw Error("ElasticTets: {} tets but {} entries in material_of_tet", rest.tets.size(),
+                material_of_tet.size());
+  for (std::size_t t = 0; t < rest.tets.size(); ++t) {
+    int const m = material_of_tet[t];
+    if (m < 0 || std::size_t(m) >= materials.size())
+      throw Error("ElasticTets: tet {} has material {} of {}", t, m, materials.size());
+    for (int v : rest.tets[t]) {
+      if (v < 0 || std::size_t(v) >= rest.points.size())
+        throw Error("ElasticTets: tet {} has vertex {} of {}", t, v, rest.points.size());
+    }
+  }
+  Patches const host = make_patches(rest.tets, material_of_tet,
+                                    static_cast<int>(rest.points.size()), lanes, params.patch_size);
+  std::vector<double> shapes(10 * host.tet.size());
+  for (std::size_t e = 0; e < host.tet.size(); ++e) {
+    RestShape const shape = rest_shape(rest.points, rest.tets[host.tet[e]]);
+    for (int k = 0; k < 9; ++k) shapes[10 * e + k] = shape.B.a[k];
+    shapes[10 * e + 9] = host.padding[e] ? 0 : shape.W;
+  }
+  patches_ = copy_patches<Space, Real>(host, shapes);
+  for (auto const& colour : host.colours) {
+    colours_.push_back(to_space<Space>("patch_colour", colour));
+  }
+  vertices_.reserve(4 * rest.tets.size());
+  for (Tet const& tet : rest.tets) vertices_.insert(vertices_.end(), tet.begin(), tet.end());
+  reducer_ = Reducer<Space, Sum>::of_partials(patches_.count);
+  bounds_ = Bounds("elastic_bounds", patches_.count);
+}
+
+template <ElementMaterial Material, class Precision, class Space>
+double ElasticTets<Material, Precision, Space>::measure(kernels::Measure what, Positions const& x,
+                                                        Vectors const& p, double alpha) const {
+  using kernels::Measure;
+  if (what == Measure::energy) return measured<Measure::energy>("elastic_energy", x, p, alpha);
+  if (what == Measure::change) return measured<Measure::change>("elastic_change", x, p, alpha);
+  return measured<Measure::form>("elastic_quadratic_form", x, p, alpha);
+}
+
+template <ElementMaterial Material, class Precision, class Space>
+double ElasticTets<Material, Precision, Space>::sweep(Positions const& x, Vectors const* p,
+                                                      double alpha, double scale, Output to) const {
+  using kernels::Curvature;
+  Curvature const curvature = to.blocks.extent(0) > 0     ? Curvature::blocks
+                              : to.diagonal.extent(0) > 0 ? Curvature::diagonal
+                                                          : Curvature::none;
+  provide_partial(to, 3 + static_cast<int>(curvature));
+  using Kernel = kernels::GradientSweep<Space, Precision, Material>;
+  run("elastic_gradient", Kernel{{patches_},
+                                 materials_,
+                                 curvature,
+                                 p != nullptr,
+                                 x,
+                                 p ? *p : Vectors(),
+                                 static_cast<Real>(alpha),
+                                 static_cast<Real>(scale),
+                                 to,
+                                 reducer_.partials()});
+  if (curvature == Curvature::none) gather<3>(to);
+  if (curvature == Curvature::diagonal) gather<6>(to);
+  if (curvature == Curvature::blocks) gather<9>(to);
+  if (!p) return 0;
+  return reducer_.template finish<1>("elastic_change", patches_.count)[0];
+}
+
+template <ElementMaterial Material, class Precision, class Space>
+void ElasticTets<Material, Precision, Space>::add_product(Positions const& x, Vectors const& p,
+                                                          double scale,
+                                                          FixedMask<Space> const& fixed,
+                                                          Vectors const& hp) const {
+  Output to{{}, fixed, hp, {}, {}};
+  provide_partial(to, 3);
+  using Kernel = kernels::ProductSweep<Space, Precision, Material>;
+  run("elastic_product", Kernel{{patches_}, materials_, x, p, static_cast<Real>(scale), to});
+  gather<3>(to);
+}
+
+template <ElementMaterial Material, class Precision, class Space>
+void ElasticTets<Material, Precision, Space>::add_to(Matrix const& matrix, Positions const& x,
+                                                     double scale,
+                                                     FixedMask<Space> const& fixed) const {
+  for (auto const& colour : colours_) {
+    using Kernel = kernels::AssembleColour<Space, Precision, Material, Matrix>;
+    for_each<Space>("elastic_assemble", static_cast<int>(colour.extent(0)),
+                    Kernel{patches_, materials_, colour, x, fixed, matrix, scale});
+  }
+}
+
+template <ElementMaterial Material, class Precision, class Space>
+double ElasticTets<Material, Precision, Space>::step_to_inversion(Positions const& x,
+                                                                  Vectors const& p, double at_most,
+                                                                  bool strict) const {
+  using Kernel = kernels::InversionSweep<Space, Precision>;
+  run("elastic_max_step", Kernel{{patches_}, x, p, at_most, strict, bounds_});
+  return smallest_bound(at_most);
+}
+
+template <ElementMaterial Material, class Precision, class Space>
+double ElasticTets<Material, Precision, Space>::smallest_bound(double ceiling) const {
+  return minimum<Space>("elastic_bound", patches_.count, ceiling,
+                        kernels::SmallestOf<Space>{bounds_});
+}
+
+template <ElementMaterial Material, class Precision, class Space>
+void ElasticTets<Material, Precision, Space>::provide_partial(Output& to, int numbers) const {
+  if (to.fixed.extent_int(0) != patches_.vertices)
+    throw Error("ElasticTets: the mesh has {} vertices, the potential {} unknowns",
+                patches_.vertices, to.fixed.extent(0));
+  std::size_t const needed = std::size_t(numbers) * patches_.shared_rows;
+  if (partial_.extent(0) < needed) {
+    partial_ = Scratch(
+        Kokkos::view_alloc(Kokkos::WithoutInitializing, std::string("elastic_partial")), needed);
+  }
+  to.partial = partial_;
+}
 
 }  // namespace taut

@@ -7,86 +7,62 @@
 
 namespace taut::kernels {
 
-/// A step along p that certainly inverts no element of the patch, found without roots: det (F + t
-/// dF) > 0 while t |F^-1 dF| < 1, and F^-1 dF = cof(F)' dF / J. Zero where an element is so flat
-/// that round-off counts, or where anything is not a number.
+/// A length t such that x + s p certainly inverts no element for |s| <= t, found without roots:
+/// det(F + s dF) > 0 while |s| |F^-1 dF| < 1, and F^-1 dF = C' dF / J with the cofactor C. Zero
+/// where an element is so flat that round-off counts, or where anything is not a number. All in
+/// squares, and with |C| <= I2 / sqrt 3, so that one root per patch is enough.
 ///
 /// Round-off: with m the largest local coordinate, an edge is off by at most 2 eps m and F by dF0 =
 /// 2 eps m |B|. While J > 32 |C| dF0 that changes F^-1 by less than 1/16, and while J > 1e-4 |F|^3
 /// the errors of C and J themselves are far below that; the factor 0.9 covers both. What the same
-/// errors do to F^-1 dF is added to it.
+/// errors do to C' dF,
+///   e = I2 (8 eps |dF| + 8 eps m_p |B|),
+/// is added to it: (|C' dF| + e)^2 <= 17/16 |C' dF|^2 + 17 e^2. The squares are kept from the
+/// smallest numbers by `least_square`, and what has overflowed certifies nothing.
+template <class T>
+struct InversionCertificate {
+  using Real = ValueType<T>;
+  static constexpr Real eps = Kokkos::Experimental::epsilon_v<Real>;
+  static constexpr Real least_square = Real(1e-30);
+
+  T flat;   ///< (64 eps m)^2 / 3
+  T shaky;  ///< 34 (8 eps m_p)^2
+
+  /// `largest_x`, `largest_p`: m and m_p, the largest numbers of the local fields.
+  KOKKOS_FORCEINLINE_FUNCTION InversionCertificate(Real largest_x, Real largest_p)
+      : flat(square(64 * eps * largest_x) / 3), shaky(34 * square(8 * eps * largest_p)) {}
+
+  /// t^2 of an element.
+  KOKKOS_FORCEINLINE_FUNCTION T square_length(Mat3<T> const& B, Mat3<T> const& F,
+                                              Mat3<T> const& dF) const {
+    Mat3<T> const C = cofactor(F), G = transpose_times(C, dF);
+    T const J = dot(F.column(0), C.column(0)), I2 = contract(F, F), B2 = contract(B, B);
+    T const least = square(I2) * max(T(Real(1e-8)) * I2, flat * B2) + T(least_square);
+    T const error = square(I2) * (T(34 * square(8 * eps)) * contract(dF, dF) + shaky * B2);
+    T const motion = T(Real(17) / 16) * contract(G, G) + error + T(least_square);
+    T const length = select(J * abs(J) > least, T(Real(0.81)) * square(J) / motion, T(0));
+    return select(length <= T(Kokkos::Experimental::finite_max_v<Real>), length, T(0));
+  }
+};
+
+/// The largest step along p up to `at_most` that inverts no element of the patch, in fp64: the
+/// certificate where it is enough, otherwise the smallest root of the elements. An element that is
+/// flat or inverted already allows no step if `strict`, and any otherwise.
 template <class S, class Precision>
-struct CertificateSweep : PatchSweep<S, typename Precision::real> {
+struct InversionSweep : PatchSweep<S, typename Precision::real> {
   using Real = typename Precision::real;
   using Base = PatchSweep<S, Real>;
   using T = typename Base::Value;
 
   VectorField<typename Precision::position, S> x;
   VectorField<Real, S> p;
-  Kokkos::View<Real*, typename S::memory> certified;
+  double at_most;
+  bool strict;
+  Kokkos::View<double*, typename S::memory> bound;  ///< per patch
 
   std::size_t scratch_bytes() const {
     return 2 * ScratchField<S, Real>::shmem_size(std::size_t(4) * this->patches.max_locals);
   }
-
-  /// Largest number of the patch's rows.
-  template <class Team>
-  KOKKOS_FORCEINLINE_FUNCTION Real largest(Team const& team, int patch,
-                                           ScratchField<S, Real> const& field) const {
-    Real result = 0;
-    Kokkos::parallel_reduce(
-        Kokkos::TeamThreadRange(team, 4 * this->locals(patch)),
-        [&](int k, Real& most) { most = Kokkos::max(most, Kokkos::abs(field(k))); },
-        Kokkos::Max<Real>(result));
-    return result;
-  }
-
-  KOKKOS_FUNCTION void operator()(typename S::team_member const& team, double& smallest) const {
-    int const patch = team.league_rank();
-    auto const& v = this->patches;
-    ScratchField<S, Real> const local_x(team.team_scratch(0), 4 * v.max_locals);
-    ScratchField<S, Real> const local_p(team.team_scratch(0), 4 * v.max_locals);
-    this->load_relative(team, patch, x, local_x);
-    this->load_relative(team, patch, p, local_p);
-    team.team_barrier();
-    constexpr Real eps = Kokkos::Experimental::epsilon_v<Real>;
-    T const flat(64 * eps * largest(team, patch, local_x));
-    T const shaky(8 * eps * largest(team, patch, local_p));
-    auto const elements = this->elements(patch);
-    Real best = Kokkos::Experimental::finite_max_v<Real>;
-    Kokkos::parallel_reduce(
-        Kokkos::TeamThreadRange(team, this->groups(patch)),
-        [&](int g, Real& least) __attribute__((always_inline)) {
-          Mat3<T> const B = elements.inverse_rest(g);
-          Mat3<T> const F = elements.edges(g, local_x.data()) * B;
-          Mat3<T> const dF = elements.edges(g, local_p.data()) * B;
-          Mat3<T> const C = cofactor(F), G = transpose_times(C, dF);
-          T const J = dot(F.column(0), C.column(0)), I2 = contract(F, F);
-          T const norm_B = sqrt(contract(B, B)), norm_C = sqrt(contract(C, C));
-          T const least_J = max(T(Real(1e-4)) * I2 * sqrt(I2), flat * norm_B * norm_C);
-          T const error = I2 * (T(8 * eps) * sqrt(contract(dF, dF)) + shaky * norm_B);
-          T const length = T(Real(0.9)) * J / (sqrt(contract(G, G)) + error + T(Real(1e-30)));
-          T const safe = select(J > least_J, length, T(0));
-          least = Kokkos::min(least, min_lanes(select(safe >= T(0), safe, T(0))));
-        },
-        Kokkos::Min<Real>(best));
-    Kokkos::single(Kokkos::PerTeam(team), [&]() {
-      certified(patch) = best;
-      smallest = Kokkos::min(smallest, double(best));
-    });
-  }
-};
-
-/// Smallest step along p up to `at_most` at which an element of the patch reaches J = 0, in fp64.
-/// An element that is flat or inverted already allows no step if `strict`, and any otherwise.
-template <class S, class Precision>
-struct InversionSweep {
-  PatchViews<S, typename Precision::real> patches;
-  VectorField<typename Precision::position, S> x;
-  VectorField<typename Precision::real, S> p;
-  Kokkos::View<typename Precision::real*, typename S::memory> certified;
-  double at_most;
-  bool strict;
 
   template <class Field>
   KOKKOS_FORCEINLINE_FUNCTION Vec3<double> edge(Field const& field, int from, int to) const {
@@ -95,25 +71,25 @@ struct InversionSweep {
     return d;
   }
 
-  KOKKOS_FORCEINLINE_FUNCTION double bound(int e, int const* vertex) const {
-    constexpr int lanes = PatchViews<S, typename Precision::real>::lanes;
-    std::uint16_t const* corner =
-        patches.corner.data() + std::size_t(e / lanes) * 4 * lanes + e % lanes;
-    int v[4];
-    for (int a = 0; a < 4; ++a) v[a] = vertex[corner[a * lanes] / 4];
+  KOKKOS_FORCEINLINE_FUNCTION double step_to_flat(int e, int const* vertex) const {
+    constexpr int pack = Base::lanes;
+    auto const& v = this->patches;
+    std::uint16_t const* corner = v.corner.data() + std::size_t(e / pack) * 4 * pack + e % pack;
+    int at[4];
+    for (int a = 0; a < 4; ++a) at[a] = vertex[corner[a * pack] / 4];
     Mat3<double> D, d;
     double motion = 0;
     for (int a = 0; a < 3; ++a) {
-      D.set_column(a, edge(x, v[3], v[a]));
-      d.set_column(a, edge(p, v[3], v[a]));
+      D.set_column(a, edge(x, at[3], at[a]));
+      d.set_column(a, edge(p, at[3], at[a]));
       motion += dot(d.column(a), d.column(a));
     }
     constexpr double infinity = Kokkos::Experimental::infinity_v<double>;
     if (motion == 0) return infinity;
     // J has the sign of det(D) det(B): a rest tet may be numbered either way round.
     Mat3<double> B;
-    auto const* rest = patches.rest.data() + std::size_t(e / lanes) * 10 * lanes + e % lanes;
-    for (int k = 0; k < 9; ++k) B.a[k] = double(rest[k * lanes]);
+    auto const* rest = v.rest.data() + std::size_t(e / pack) * 10 * pack + e % pack;
+    for (int k = 0; k < 9; ++k) B.a[k] = double(rest[k * pack]);
     double const sign = determinant(B) < 0 ? -1 : 1;
     Mat3<double> const C = cofactor(D), c = cofactor(d);
     double const det = sign * dot(D.column(0), C.column(0));
@@ -122,18 +98,45 @@ struct InversionSweep {
                                   sign * determinant(d));
   }
 
-  KOKKOS_FUNCTION void operator()(typename S::team_member const& team, double& smallest) const {
-    constexpr int lanes = PatchViews<S, typename Precision::real>::lanes;
+  KOKKOS_FUNCTION void operator()(typename S::team_member const& team) const {
     int const patch = team.league_rank();
-    if (double(certified(patch)) >= at_most) return;
-    int const* vertex = patches.vertex.data() + patches.local_begin(patch);
-    double best = smallest;
-    Kokkos::parallel_reduce(
-        Kokkos::TeamThreadRange(team, patches.pack_begin(patch) * lanes,
-                                patches.pack_begin(patch + 1) * lanes),
-        [&](int e, double& least) { least = Kokkos::min(least, bound(e, vertex)); },
-        Kokkos::Min<double>(best));
-    Kokkos::single(Kokkos::PerTeam(team), [&]() { smallest = Kokkos::min(smallest, best); });
+    auto const& v = this->patches;
+    ScratchField<S, Real> const local_x(team.team_scratch(0), 4 * v.max_locals);
+    ScratchField<S, Real> const local_p(team.team_scratch(0), 4 * v.max_locals);
+    this->load_relative(team, patch, x, local_x);
+    this->load_relative(team, patch, p, local_p);
+    team.team_barrier();
+    InversionCertificate<T> const certificate(this->largest(team, patch, local_x),
+                                              this->largest(team, patch, local_p));
+    auto const elements = this->elements(patch);
+    T square_length(Kokkos::Experimental::finite_max_v<Real>);
+    auto const certify = [&](int g) __attribute__((always_inline)) {
+      Mat3<T> const B = elements.inverse_rest(g);
+      Mat3<T> const F = elements.edges(g, local_x.data()) * B;
+      Mat3<T> const dF = elements.edges(g, local_p.data()) * B;
+      square_length = min(square_length, certificate.square_length(B, F, dF));
+    };
+    Kokkos::parallel_for(Kokkos::TeamThreadRange(team, this->groups(patch)), certify);
+    double length = this->smallest(team, square_length);
+    if (length < at_most) {
+      int const* vertex = v.vertex.data() + v.local_begin(patch);
+      length = at_most;
+      auto const solve = [&](int e) { length = Kokkos::min(length, step_to_flat(e, vertex)); };
+      Kokkos::parallel_for(Kokkos::TeamThreadRange(team, v.pack_begin(patch) * Base::lanes,
+                                                   v.pack_begin(patch + 1) * Base::lanes),
+                           solve);
+      team.team_reduce(Kokkos::Min<double>(length));
+    }
+    Kokkos::single(Kokkos::PerTeam(team), [&]() { bound(patch) = Kokkos::min(length, at_most); });
+  }
+};
+
+/// The smallest number of a list, for `minimum`.
+template <class S>
+struct SmallestOf {
+  Kokkos::View<double*, typename S::memory> list;
+  KOKKOS_FUNCTION void operator()(int i, double& least) const {
+    least = Kokkos::min(least, list(i));
   }
 };
 

@@ -73,6 +73,23 @@ struct PatchSweep {
     Kokkos::parallel_for(Kokkos::TeamThreadRange(team, locals(patch)), body);
   }
 
+  /// The largest number of the patch's rows, without sign; what is not a number is passed over.
+  template <class Team>
+  KOKKOS_FORCEINLINE_FUNCTION Real largest(Team const& team, int patch,
+                                           ScratchField<S, Real> const& field) const {
+    int const count = 4 * locals(patch);
+    Real const* const from = field.data();
+    Value most(0);
+    // The last pack is moved back to where there are numbers: a patch has four rows or more.
+    auto const body = [&](int k) __attribute__((always_inline)) {
+      most = max(most, abs(load<Value>(from + Kokkos::min(k * width, count - width))));
+    };
+    Kokkos::parallel_for(Kokkos::TeamThreadRange(team, (count + width - 1) / width), body);
+    Real result = max_lanes(most);
+    team.team_reduce(Kokkos::Max<Real>(result));
+    return result;
+  }
+
   /// The elements of one patch behind plain pointers, which stay in registers through the stores of
   /// a sweep.
   struct Elements {
@@ -185,6 +202,14 @@ struct PatchSweep {
       for (int g = 0; g < groups(patch); ++g) sum += per_group(g);
       total(patch) = static_cast<typename Total::value_type>(sum);
     });
+  }
+
+  /// The root of the smallest square that the threads of a team have found.
+  template <class Team>
+  KOKKOS_FORCEINLINE_FUNCTION static double smallest(Team const& team, Value const& squares) {
+    Real result = min_lanes(squares);
+    team.team_reduce(Kokkos::Min<Real>(result));
+    return Kokkos::sqrt(double(result));
   }
 
 private:

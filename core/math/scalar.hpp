@@ -163,6 +163,31 @@ KOKKOS_FORCEINLINE_FUNCTION double sum_lanes(T const& a) {
   return sum[0];
 }
 
+/// Whether a mask holds in any lane.
+template <class T, class Abi>
+KOKKOS_FORCEINLINE_FUNCTION bool any_lane(
+    Kokkos::Experimental::basic_simd_mask<T, Abi> const& mask) {
+#if defined(__AVX2__) && !defined(__CUDACC__)
+  // One instruction, where Kokkos asks lane after lane.
+  if constexpr (requires { static_cast<__m256>(mask); }) {
+    return _mm256_movemask_ps(static_cast<__m256>(mask)) != 0;
+  } else if constexpr (requires { static_cast<__m256d>(mask); }) {
+    return _mm256_movemask_pd(static_cast<__m256d>(mask)) != 0;
+  }
+#endif
+  return Kokkos::Experimental::any_of(mask);
+}
+
+/// Largest lane.
+template <class T>
+KOKKOS_FORCEINLINE_FUNCTION ValueType<T> max_lanes(T const& a) {
+  constexpr int lanes = ScalarTraits<T>::lanes;
+  ValueType<T> value[lanes];
+  store(a, value);
+  for (int i = 1; i < lanes; ++i) value[0] = Kokkos::max(value[0], value[i]);
+  return value[0];
+}
+
 /// Smallest lane.
 template <class T>
 KOKKOS_FORCEINLINE_FUNCTION ValueType<T> min_lanes(T const& a) {

@@ -41,7 +41,12 @@ public:
     return total([&](auto const& t) { return t.change(x, p, alpha, scale); });
   }
   double quadratic_form(Positions const& x, Vectors const& p, double scale) const {
-    return total([&](auto const& t) { return t.quadratic_form(x, p, scale); });
+    double unused = 0;
+    return quadratic_form(x, p, scale, unused);
+  }
+  double quadratic_form(Positions const& x, Vectors const& p, double scale,
+                        double& certified) const {
+    return total([&](auto const& t) { return t.quadratic_form(x, p, scale, certified); });
   }
   void add_gradient(Positions const& x, double scale, Fixed const& fixed, Vectors const& g) const {
     for (auto const& t : terms_) t->add_gradient(x, scale, fixed, g);
@@ -69,7 +74,10 @@ public:
     for (auto const& t : terms_) t->add_to(matrix, x, scale, fixed);
   }
   double max_step(Positions const& x, Vectors const& p, double at_most) const {
-    for (auto const& t : terms_) at_most = t->max_step(x, p, at_most);
+    return max_step(x, p, at_most, 0);
+  }
+  double max_step(Positions const& x, Vectors const& p, double at_most, double certified) const {
+    for (auto const& t : terms_) at_most = t->max_step(x, p, at_most, certified);
     return at_most;
   }
   double max_prescribed_step(Positions const& x, Vectors const& p, double at_most) const {
@@ -118,7 +126,7 @@ private:
     virtual ~Interface() = default;
     virtual double value(Positions const&, double) const = 0;
     virtual double change(Positions const&, Vectors const&, double, double) const = 0;
-    virtual double quadratic_form(Positions const&, Vectors const&, double) const = 0;
+    virtual double quadratic_form(Positions const&, Vectors const&, double, double&) const = 0;
     virtual void add_gradient(Positions const&, double, Fixed const&, Vectors const&) const = 0;
     virtual void add_gradient(Positions const&, double, Fixed const&, Vectors const&,
                               Vectors const&) const = 0;
@@ -133,7 +141,7 @@ private:
     virtual void add_product(Positions const&, Vectors const&, double, Fixed const&,
                              Vectors const&) const = 0;
     virtual void add_to(Matrix const&, Positions const&, double, Fixed const&) const = 0;
-    virtual double max_step(Positions const&, Vectors const&, double) const = 0;
+    virtual double max_step(Positions const&, Vectors const&, double, double) const = 0;
     virtual double max_prescribed_step(Positions const&, Vectors const&, double) const = 0;
     virtual void elements(std::vector<Connectivity>&) const = 0;
     virtual std::int64_t pattern_version(Positions const&) const = 0;
@@ -153,8 +161,9 @@ private:
     double change(Positions const& x, Vectors const& p, double a, double h) const override {
       return term.change(x, p, a, h);
     }
-    double quadratic_form(Positions const& x, Vectors const& p, double h) const override {
-      return term.quadratic_form(x, p, h);
+    double quadratic_form(Positions const& x, Vectors const& p, double h,
+                          double& certified) const override {
+      return taut::quadratic_form(term, x, p, h, certified);
     }
     void add_gradient(Positions const& x, double h, Fixed const& f,
                       Vectors const& g) const override {
@@ -187,8 +196,9 @@ private:
     void add_to(Matrix const& m, Positions const& x, double h, Fixed const& f) const override {
       term.add_to(m, x, h, f);
     }
-    double max_step(Positions const& x, Vectors const& p, double at_most) const override {
-      return term.max_step(x, p, at_most);
+    double max_step(Positions const& x, Vectors const& p, double at_most,
+                    double certified) const override {
+      return taut::max_step(term, x, p, at_most, certified);
     }
     double max_prescribed_step(Positions const& x, Vectors const& p,
                                double at_most) const override {

@@ -71,4 +71,22 @@ concept Objective =
   { e.advance_prescribed(x) } -> std::convertible_to<bool>;
 };
 
+/// An Objective that finds on the way to p'Hp how far a step along p is certainly valid, which
+/// saves a sweep of its own in most iterations.
+///
+/// `certified` belongs to the x and p of the call that said it: whoever hands it on vouches that
+/// neither has changed (a Line does, until it moves x).
+template <class E>
+concept CertifyingObjective = Objective<E> &&
+    requires(E& e, VectorField<typename E::Precision::position, typename E::Space> const& x,
+             VectorField<typename E::Precision::real, typename E::Space> const& p, double at_most,
+             double& certified) {
+  /// p'Hp, and a length up to which the terms that can tell are valid at x + t p, for t of either
+  /// sign; infinity if there are none.
+  { e.quadratic_form(x, p, certified) } -> std::convertible_to<double>;
+  /// max_step at the x and p for which quadratic_form has said `certified`: up to that length, only
+  /// the other terms are asked.
+  { e.max_step(x, p, at_most, certified) } -> std::convertible_to<double>;
+};
+
 }  // namespace taut

@@ -112,6 +112,19 @@ struct LocalChange {
   }
 };
 
+/// The gradient where a step ends, and the change of energy that led there: one pass over what both
+/// read.
+template <class Gradient, class Change>
+struct LocalArrival {
+  Gradient gradient;
+  Change change;
+  template <class Sum>
+  KOKKOS_FUNCTION void operator()(int i, Sum& sum) const {
+    gradient(i);
+    change(i, sum);
+  }
+};
+
 template <class S, class Precision, class Kernel>
 struct LocalForm {
   Kernel kernel;
@@ -300,7 +313,8 @@ public:
   }
 
   double difference(Positions const& x, Vectors const& p, double alpha) const {
-    double total = local_change(x, p, alpha, false);
+    double total =
+        reducer_.template sum<1>("local_change", size(), change_kernel(x, p, alpha, false))[0];
     for_each_swept([&](auto const& term) { total += term.change(x, p, alpha, scale_); });
     return total;
   }
@@ -318,8 +332,7 @@ public:
 
   double gradient_after(Positions const& x, Vectors const& p, double alpha,
                         Vectors const& g) const {
-    double total = local_change(x, p, alpha, true);
-    local_gradient<0>(x, g, g);
+    double total = local_arrival<0>(x, p, alpha, g, g);
     for_each_swept([&](auto const& term) {
       total += term.add_gradient_after(x, p, alpha, scale_, unknowns_.fixed, g);
     });
@@ -335,11 +348,17 @@ public:
   }
 
   double quadratic_form(Positions const& x, Vectors const& p) const {
+    double unused;
+    return quadratic_form(x, p, unused);
+  }
+  double quadratic_form(Positions const& x, Vectors const& p, double& certified) const {
+    certified = std::numeric_limits<double>::infinity();
     auto const local = locals();
     using Kernel = kernels::LocalForm<Space, Precision, std::decay_t<decltype(local)>>;
     double total =
         reducer_.template sum<1>("local_form", size(), Kernel{local, unknowns_.fixed, x, p})[0];
-    for_each_swept([&](auto const& term) { total += term.quadratic_form(x, p, scale_); });
+    for_each_swept(
+        [&](auto const& term) { total += taut::quadratic_form(term, x, p, scale_, certified); });
     return total;
   }
 
@@ -372,7 +391,11 @@ public:
   }
 
   double max_step(Positions const& x, Vectors const& p, double at_most) const {
-    for_each_swept([&](auto const& term) { at_most = term.max_step(x, p, at_most); });
+    return max_step(x, p, at_most, 0);
+  }
+  double max_step(Positions const& x, Vectors const& p, double at_most, double certified) const {
+    for_each_swept(
+        [&](auto const& term) { at_most = taut::max_step(term, x, p, at_most, certified); });
     return at_most;
   }
 
@@ -515,12 +538,28 @@ private:
   }
 
   template <int numbers, class CurvatureField>
-  void local_gradient(Positions const& x, Vectors const& g, CurvatureField const& c) const {
+  auto gradient_kernel(Positions const& x, Vectors const& g, CurvatureField const& c) const {
     auto const local = locals();
-    using Kernel = kernels::LocalGradient<Space, Precision, std::decay_t<decltype(local)>, numbers,
-                                          CurvatureField>;
-    for_each<Space>("local_gradient", size(),
-                    Kernel{local, unknowns_.fixed, unknowns_.mass, x, g, c});
+    return kernels::LocalGradient<Space, Precision, std::decay_t<decltype(local)>, numbers,
+                                  CurvatureField>{local, unknowns_.fixed, unknowns_.mass, x, g, c};
+  }
+  auto change_kernel(Positions const& x, Vectors const& p, double alpha, bool arrived) const {
+    auto const local = locals();
+    return kernels::LocalChange<Space, Precision, std::decay_t<decltype(local)>>{
+        local, unknowns_.fixed, x, p, alpha, arrived};
+  }
+  template <int numbers, class CurvatureField>
+  void local_gradient(Positions const& x, Vectors const& g, CurvatureField const& c) const {
+    for_each<Space>("local_gradient", size(), gradient_kernel<numbers>(x, g, c));
+  }
+  template <int numbers, class CurvatureField>
+  double local_arrival(Positions const& x, Vectors const& p, double alpha, Vectors const& g,
+                       CurvatureField const& c) const {
+    auto const gradient = gradient_kernel<numbers>(x, g, c);
+    auto const change = change_kernel(x, p, alpha, true);
+    using Kernel =
+        kernels::LocalArrival<std::decay_t<decltype(gradient)>, std::decay_t<decltype(change)>>;
+    return reducer_.template sum<1>("local_arrival", size(), Kernel{gradient, change})[0];
   }
   template <int numbers, class CurvatureField>
   void gradient_with(Positions const& x, Vectors const& g, CurvatureField const& c) const {
@@ -530,20 +569,12 @@ private:
   template <int numbers, class CurvatureField>
   double gradient_after_with(Positions const& x, Vectors const& p, double alpha, Vectors const& g,
                              CurvatureField const& c) const {
-    double total = local_change(x, p, alpha, true);
-    local_gradient<numbers>(x, g, c);
+    double total = local_arrival<numbers>(x, p, alpha, g, c);
     for_each_swept([&](auto const& term) {
       total += term.add_gradient_after(x, p, alpha, scale_, unknowns_.fixed, g, c);
     });
     return total;
   }
-  double local_change(Positions const& x, Vectors const& p, double alpha, bool arrived) const {
-    auto const local = locals();
-    using Kernel = kernels::LocalChange<Space, Precision, std::decay_t<decltype(local)>>;
-    return reducer_.template sum<1>("local_change", size(),
-                                    Kernel{local, unknowns_.fixed, x, p, alpha, arrived})[0];
-  }
-
   Unknowns<Precision, Space> unknowns_;
   std::tuple<Terms...> terms_;
   Vectors direction_;

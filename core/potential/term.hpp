@@ -133,4 +133,41 @@ concept ObstructedTerm = SweptTerm<Term> && requires(Term const& term) {
   { term.obstruction() } -> std::same_as<std::optional<Obstruction>>;
 };
 
+/// A swept term that finds on the way to p'Hp how far a step along p is certainly valid.
+///
+/// `certified` belongs to the x and p of the call that said it: whoever hands it on vouches that
+/// neither has changed. Terms keep nothing of it.
+template <class Term>
+concept CertifyingTerm = SweptTerm<Term> &&
+    requires(Term const& term,
+             VectorField<typename Term::Precision::position, typename Term::Space> x,
+             VectorField<typename Term::Precision::real, typename Term::Space> p, double scale,
+             double at_most, double& certified) {
+  /// p'Hp; lowers `certified` to a length up to which x + t p is valid, for t of either sign.
+  { term.quadratic_form(x, p, scale, certified) } -> std::convertible_to<double>;
+  /// max_step at the x and p for which quadratic_form has said `certified`.
+  { term.max_step(x, p, at_most, certified) } -> std::convertible_to<double>;
+};
+
+/// The same of any swept term: one that does not certify leaves `certified` alone, and looks for
+/// its largest step in any case.
+template <SweptTerm Term, class Positions, class Vectors>
+double quadratic_form(Term const& term, Positions const& x, Vectors const& p, double scale,
+                      double& certified) {
+  if constexpr (CertifyingTerm<Term>) {
+    return term.quadratic_form(x, p, scale, certified);
+  } else {
+    return term.quadratic_form(x, p, scale);
+  }
+}
+template <SweptTerm Term, class Positions, class Vectors>
+double max_step(Term const& term, Positions const& x, Vectors const& p, double at_most,
+                double certified) {
+  if constexpr (CertifyingTerm<Term>) {
+    return term.max_step(x, p, at_most, certified);
+  } else {
+    return term.max_step(x, p, at_most);
+  }
+}
+
 }  // namespace taut

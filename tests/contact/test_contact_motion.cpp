@@ -2,12 +2,10 @@
 // they come to rest is a matter of the load alone.
 #include "contact_scenes.hpp"
 
-#include <taut/core/fem/elastic_tets.hpp>
 #include <taut/core/potential/potential.hpp>
 #include <taut/integrators/ncg.hpp>
 #include <taut/integrators/time_stepper.hpp>
-#include <taut/materials/elastic.hpp>
-#include <taut/materials/stable_neo_hookean.hpp>
+#include <taut/presets/elastic.hpp>
 
 #include <catch2/catch_test_macros.hpp>
 #include <catch2/generators/catch_generators.hpp>

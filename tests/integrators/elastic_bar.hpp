@@ -2,11 +2,9 @@
 #pragma once
 
 #include <taut/core/fem/body.hpp>
-#include <taut/core/fem/elastic_tets.hpp>
 #include <taut/core/fem/shapes.hpp>
 #include <taut/core/potential/potential.hpp>
-#include <taut/materials/elastic.hpp>
-#include <taut/materials/stable_neo_hookean.hpp>
+#include <taut/presets/elastic.hpp>
 
 #include <cmath>
 #include <vector>

@@ -1,12 +1,10 @@
 // A body that falls freely starts each step where it ends: all that is left is round-off.
 #include <taut/core/fem/body.hpp>
-#include <taut/core/fem/elastic_tets.hpp>
 #include <taut/core/fem/shapes.hpp>
 #include <taut/core/potential/potential.hpp>
 #include <taut/integrators/ncg.hpp>
 #include <taut/integrators/time_stepper.hpp>
-#include <taut/materials/elastic.hpp>
-#include <taut/materials/stable_neo_hookean.hpp>
+#include <taut/presets/elastic.hpp>
 
 #include <catch2/catch_template_test_macros.hpp>
 #include <catch2/catch_test_macros.hpp>

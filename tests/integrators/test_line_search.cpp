@@ -107,6 +107,73 @@ TEST_CASE("no step leaves more than the asked fraction of what is valid") {
   CHECK(step.energy_change < 0);
 }
 
+namespace {
+
+/// A chain that certifies, with p'Hp, `part` of its largest step, and counts who asks for more.
+struct CertifyingChain : toy::Chain<toy::Barrier> {
+  using Chain = toy::Chain<toy::Barrier>;
+  using Chain::max_step;
+  using Chain::quadratic_form;
+  double part = 0;
+  mutable int searches = 0;
+
+  double quadratic_form(Positions const& x, Field const& p, double& certified) const {
+    Field const back("back", size());
+    for (int i = 0; i < size(); ++i)
+      for (int c = 0; c < 3; ++c) back(i, c) = -p(i, c);
+    certified = part * std::min(Chain::max_step(x, p, toy::infinity),
+                                Chain::max_step(x, back, toy::infinity));
+    return Chain::quadratic_form(x, p);
+  }
+  double max_step(Positions const& x, Field const& p, double at_most, double certified) const {
+    if (at_most <= certified) return at_most;
+    ++searches;
+    return Chain::max_step(x, p, at_most);
+  }
+};
+
+}  // namespace
+
+TEST_CASE("a step within what p'Hp has certified is not looked for again, a longer one is") {
+  static_assert(CertifyingObjective<CertifyingChain>);
+  static_assert(!CertifyingObjective<toy::Chain<toy::Barrier>>);
+  for (double factor : {1.0, -1.0}) {
+    Setting<toy::Barrier> s(factor);
+    CertifyingChain chain;
+    auto const search = [&](double part) {
+      chain.part = part;
+      chain.searches = 0;
+      auto const x = chain.start();
+      Line<CertifyingChain> line(chain, x, s.fields, {}, s.slope, 0, 0);
+      return NewtonStep()(line, 0);
+    };
+    auto plain = s.line();
+    Step const expected = NewtonStep()(plain, 0);
+    REQUIRE(expected.length * factor > 0);
+    for (double part : {0.0, 1e-6, 1.0}) {
+      Step const step = search(part);
+      CHECK(step.length == expected.length);
+      CHECK(step.cut == expected.cut);
+      CHECK(step.bound == expected.bound);
+      CHECK(chain.searches == 1);  // the bound cuts this step
+    }
+    // A short step needs no search, unless nothing is certified.
+    auto const short_step = [&](double part, bool form_first) {
+      chain.part = part;
+      chain.searches = 0;
+      auto const x = chain.start();
+      Line<CertifyingChain> line(chain, x, s.fields, {}, s.slope, 0, 0);
+      if (form_first) line.curvature();
+      double const length = 1e-3 * std::abs(expected.length);
+      CHECK(line.max_length(length, factor < 0) == length);
+      return chain.searches;
+    };
+    CHECK(short_step(1.0, true) == 0);
+    CHECK(short_step(0.0, true) == 1);
+    CHECK(short_step(1.0, false) == 1);  // p'Hp was not asked for: nothing is known
+  }
+}
+
 TEST_CASE("an uphill direction is followed backwards, within the same bounds") {
   Setting<toy::Barrier> s(-1);
   auto const backwards = Setting<toy::Barrier>(1).fields.direction;

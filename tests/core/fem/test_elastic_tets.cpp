@@ -1,174 +1,31 @@
-// The patch sweeps against the serial oracle: every kernel, every precision, both layouts, any team
-// and patch size; and the guarantee that the number of threads does not change a bit.
-#include "elastic_oracle.hpp"
+// Elastic bodies beyond single sweeps: the guarantee that layout, teams and the number of threads
+// do not change a bit, differences (F3), balance of forces (F2), the assembled Hessian and the
+// largest step.
+#include "elastic_samples.hpp"
 
 #include <support/threads.hpp>
 #include <taut/core/fem/body.hpp>
-#include <taut/core/fem/elastic_tets.hpp>
-#include <taut/core/fem/shapes.hpp>
 #include <taut/core/potential/potential.hpp>
 #include <taut/core/sparse/operations.hpp>
-#include <taut/materials/models.hpp>
 
-#include <catch2/catch_template_test_macros.hpp>
 #include <catch2/catch_test_macros.hpp>
 #include <catch2/matchers/catch_matchers_floating_point.hpp>
 
 #include <algorithm>
 
 using namespace taut;
+using namespace taut::test;
 using Catch::Matchers::WithinAbs;
 using Catch::Matchers::WithinRel;
 
 namespace {
 
-struct Sample {
-  TetMesh rest;
-  std::vector<Point> x;
-  std::vector<Point> p;
-  std::vector<int> material_of_tet;
-
-  explicit Sample(int resolution = 6, double jitter = 0.02) {
-    TetMesh const mesh = make_shape(BoxShape{{1, 1.2, 0.9}}, resolution);
-    Ordering const order = locality_order(mesh);
-    for (int v : order.vertices) rest.points.push_back(mesh.points[v]);
-    for (int t : order.tets) {
-      Tet tet;
-      for (int a = 0; a < 4; ++a) tet[a] = order.new_vertex[mesh.tets[t][a]];
-      rest.tets.push_back(tet);
-      material_of_tet.push_back(rest.points[tet[0]][1] > 0 ? 1 : 0);
-    }
-    std::vector<Point> const noise = test::random_points(rest.points.size(), jitter, 3);
-    p = test::random_points(rest.points.size(), 1, 4);
-    for (std::size_t i = 0; i < rest.points.size(); ++i) {
-      Point const& X = rest.points[i];
-      // A twist and a stretch, far from the origin.
-      double const angle = 0.8 * X[1], c = std::cos(angle), s = std::sin(angle);
-      x.push_back({3 + 1.1 * (c * X[0] - s * X[2]) + noise[i][0], -7 + 0.9 * X[1] + noise[i][1],
-                   1.1 * (s * X[0] + c * X[2]) + noise[i][2]});
-    }
-    // Tets come in groups of one material.
-    std::stable_sort(rest.tets.begin(), rest.tets.end(), [&](Tet const& a, Tet const& b) {
-      return (rest.points[a[0]][1] > 0) < (rest.points[b[0]][1] > 0);
-    });
-    std::sort(material_of_tet.begin(), material_of_tet.end());
-  }
-};
-
-std::vector<Lame<double>> const two_materials = {lame_parameters(1e4, 0.3),
-                                                 lame_parameters(1e5, 0.45)};
-
-double largest(std::vector<Point> const& field) {
-  double m = 0;
-  for (Point const& p : field)
-    for (double c : p) m = std::max(m, std::abs(c));
-  return m;
-}
-
-template <class View>
-auto host(View const& v) {
-  return Kokkos::create_mirror_view_and_copy(Kokkos::HostSpace(), v);
-}
-
-/// Compares every sweep with the oracle, to `tolerance` relative to the largest entry.
-template <class Material, class Precision, class S>
-void compare(Sample const& body, SweepParams const& params, double tolerance) {
-  using Term = ElasticTets<Material, Precision, S>;
-  Term const term(body.rest, two_materials, body.material_of_tet, params);
-  test::ElasticOracle<typename Material::Model, typename Material::Filter> const oracle{
-      body.rest, two_materials, body.material_of_tet};
-  std::size_t const n = body.rest.points.size();
-  double const scale = 0.25, alpha = 1e-3;
-  auto const x = test::to_field(body.x, typename Term::Positions());
-  auto const p = test::to_field(body.p, typename Term::Vectors());
-  FixedMask<S> const fixed("fixed", n);
-  typename Term::Vectors const g("g", n), d("d", n), hp("hp", n);
-  typename Term::Blocks const h("h", n);
-
-  CHECK_THAT(term.value(x, scale), WithinRel(scale * oracle.value(body.x), tolerance));
-  CHECK_THAT(term.quadratic_form(x, p, scale),
-             WithinRel(scale * oracle.quadratic_form(body.x, body.p), tolerance));
-  std::vector<Point> moved = body.x;
-  for (std::size_t i = 0; i < n; ++i)
-    for (int c = 0; c < 3; ++c) moved[i][c] += alpha * body.p[i][c];
-  double const change = scale * (oracle.value(moved) - oracle.value(body.x));
-  CHECK_THAT(term.change(x, p, alpha, scale), WithinRel(change, std::max(100 * tolerance, 1e-9)));
-
-  auto const close = [&](auto const& field, std::vector<Point> const& expected) {
-    auto const f = host(field);
-    double const unit = scale * largest(expected);
-    double worst = 0;
-    for (std::size_t i = 0; i < n; ++i)
-      for (int c = 0; c < 3; ++c) {
-        worst = std::max(worst, std::abs(double(f(i, c)) - scale * expected[i][c]) / unit);
-      }
-    CHECK(worst < tolerance);
-  };
-  auto const clear = [&] {
-    Kokkos::deep_copy(g, 0);
-    Kokkos::deep_copy(d, 0);
-    Kokkos::deep_copy(h, 0);
-  };
-  clear();
-  term.add_gradient(x, scale, fixed, g);
-  close(g, oracle.gradient(body.x));
-  clear();
-  term.add_gradient(x, scale, fixed, g, d);
-  close(g, oracle.gradient(body.x));
-  close(d, oracle.diagonal(body.x));
-  clear();
-  auto const arrived = test::to_field(moved, typename Term::Positions());
-  CHECK_THAT(term.add_gradient_after(arrived, p, alpha, scale, fixed, g, h),
-             WithinRel(change, std::max(100 * tolerance, 1e-9)));
-  close(g, oracle.gradient(moved));
-  auto const blocks = oracle.blocks(moved);
-  auto const hh = host(h);
-  double unit = 0, worst = 0;
-  for (auto const& b : blocks)
-    for (double e : b.s) unit = std::max(unit, std::abs(e));
-  for (std::size_t i = 0; i < n; ++i)
-    for (int k = 0; k < 6; ++k) {
-      worst = std::max(worst, std::abs(double(hh(i, k)) / scale - blocks[i].s[k]) / unit);
-    }
-  CHECK(worst < tolerance);
-  Kokkos::deep_copy(hp, 0);
-  term.add_product(x, p, scale, fixed, hp);
-  close(hp, oracle.product(body.x, body.p));
-}
-
-using Right = Space<Kokkos::DefaultHostExecutionSpace, Kokkos::LayoutRight>;
-using Left = Space<Kokkos::DefaultHostExecutionSpace, Kokkos::LayoutLeft>;
-
-}  // namespace
-
-TEMPLATE_TEST_CASE("sweeps agree with the serial oracle", "[fem]", Elastic<StableNeoHookean>,
-                   Elastic<FixedCorotated>, (Elastic<Arap, LimitLambda>),
-                   (Elastic<StableNeoHookean2018, FullProjection>)) {
-  Sample const body;
-  SECTION("fp64") { compare<TestType, Fp64, Right>(body, {}, 1e-11); }
-  SECTION("mixed") { compare<TestType, Mixed, Right>(body, {}, 2e-4); }
-}
-
-TEST_CASE("neo-Hookean sweeps agree with the serial oracle", "[fem]") {
-  Sample const body(6, 0.002);  // no inverted element
-  compare<Elastic<NeoHookean>, Fp64, Right>(body, {}, 1e-11);
-  compare<Elastic<NeoHookean>, Fp32, Right>(body, {}, 1e-3);
-}
-
-TEST_CASE("sweeps do not depend on layout, patch or team size", "[fem]") {
-  Sample const body;
-  using Material = Elastic<FixedCorotated>;
-  compare<Material, Fp64, Left>(body, {.patch_size = 64}, 1e-11);
-  compare<Material, Fp64, Right>(body, {.patch_size = 37, .team_size = 1}, 1e-11);
-}
-
-namespace {
-
-/// Everything that the sweeps of a body give, number after number.
+/// Everything that the sweeps of a body give, number after number. The material is none of
+/// presets/: those are compiled with other flags, for one space alone.
 template <class S>
 std::vector<double> all_results(Sample const& body, SweepParams const& params) {
-  ElasticTets<Elastic<FixedCorotated>, Mixed, S> const term(body.rest, two_materials,
-                                                            body.material_of_tet, params);
+  ElasticTets<Elastic<FixedCorotated, LimitLambda>, Mixed, S> const term(
+      body.rest, two_materials, body.material_of_tet, params);
   std::size_t const n = body.x.size();
   auto const x = test::to_field(body.x, VectorField<double, S>());
   auto const p = test::to_field(body.p, VectorField<float, S>());

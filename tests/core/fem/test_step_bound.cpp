@@ -3,11 +3,10 @@
 // numbering, in every precision.
 #include "elastic_oracle.hpp"
 
-#include <taut/core/fem/elastic_tets.hpp>
 #include <taut/core/math/cubic.hpp>
+#include <taut/core/potential/any_terms.hpp>
 #include <taut/core/report/error.hpp>
-#include <taut/materials/elastic.hpp>
-#include <taut/materials/neo_hookean.hpp>
+#include <taut/presets/elastic.hpp>
 
 #include <catch2/catch_template_test_macros.hpp>
 #include <catch2/catch_test_macros.hpp>
@@ -106,6 +105,103 @@ TEMPLATE_TEST_CASE("no step bound lies beyond the first inversion", "[fem]", Fp6
           }
         }
       }
+}
+
+TEMPLATE_TEST_CASE("what p'Hp certifies inverts no element, in either direction", "[fem]", Fp64,
+                   Mixed, Fp32) {
+  using Term = ElasticTets<Elastic<NeoHookean>, TestType, Host>;
+  bool const coarse = std::is_same_v<typename TestType::real, float>;
+  for (bool thin_rest : {false, true})
+    for (double flatness : {0., 3., 6.})
+      for (double length : {1., 1e3})
+        for (unsigned seed = 0; seed < 20; ++seed) {
+          Crowd const c = crowd(12, length, flatness, thin_rest, seed % 2 == 1, seed);
+          Term const term(c.rest, lame_parameters(1e5, 0.3));
+          auto const x = test::to_field(c.x, typename Term::Positions());
+          auto const p = test::to_field(c.p, typename Term::Vectors());
+          auto const back = test::to_field(c.p, typename Term::Vectors());
+          for (std::size_t i = 0; i < c.p.size(); ++i)
+            for (int k = 0; k < 3; ++k) back(i, k) = -back(i, k);
+          double certified = infinity;
+          double const form = term.quadratic_form(x, p, 1.0, certified);
+          if (first > 0) CHECK(form == term.quadratic_form(x, p, 1.0));
+          double const first =
+              std::min(first_inversion(c.rest, x, p), first_inversion(c.rest, x, back));
+          CAPTURE(thin_rest, flatness, length, seed, first, certified);
+          CHECK((certified < first || certified == 0));  // rounding may have flattened an element
+          // It is the norm of F^-1 dF that counts, where the inversion sees an eigenvalue: for the
+          // worst of twelve tets they are not far apart.
+          if (flatness == 0 && (!coarse || length == 1)) CHECK(certified > 0.1 * first);
+          // It vouches for steps up to its length, and says nothing about longer ones.
+          CHECK(term.max_step(x, p, 0.999 * certified, certified) == 0.999 * certified);
+          CHECK(term.max_step(x, p, infinity, certified) == term.max_step(x, p, infinity));
+          double lower = 1e-30;
+          term.quadratic_form(x, p, 1.0, lower);
+          CHECK(lower <= 1e-30);  // lowered, not overwritten
+        }
+}
+
+TEST_CASE("a certificate is for numbers within range", "[fem]") {
+  // Squares that overflow or vanish in fp32, and what is not a number, certify nothing.
+  using Term = ElasticTets<Elastic<NeoHookean>, Fp32, Host>;
+  Crowd const c = crowd(16, 1, 0, false, false, 1);
+  Term const term(c.rest, lame_parameters(1e5, 0.3));
+  auto const certify = [&](double size, double motion) {
+    auto x = test::to_field(c.x, Term::Positions());
+    auto const p = test::to_field(c.p, Term::Vectors());
+    for (std::size_t i = 0; i < c.x.size(); ++i)
+      for (int k = 0; k < 3; ++k) {
+        x(i, k) *= float(size);
+        p(i, k) *= float(motion);
+      }
+    double certified = infinity;
+    term.quadratic_form(x, p, 1.0, certified);
+    double const first = first_inversion(c.rest, x, p);
+    CAPTURE(size, motion, first);
+    CHECK(certified < first);
+    return certified;
+  };
+  double const usual = certify(1, 1);
+  CHECK(usual > 0);
+  for (double motion : {1e-12, 1e-6, 1e6, 1e12}) {
+    double const certified = certify(1, motion);
+    CHECK(certified <= 1.01 * usual / motion);
+    CHECK(certified >= 0.5 * usual / motion);
+  }
+  for (double size : {1e-12, 1e-7, 1e8, 1e12}) CHECK(certify(size, size) == 0);
+  CHECK(certify(1, 1e30) == 0);
+  for (double size : {1e-2, 1e2}) CHECK(std::abs(certify(size, size) / usual - 1) < 0.01);
+
+  auto const x = test::to_field(c.x, Term::Positions());
+  auto const p = test::to_field(c.p, Term::Vectors());
+  p(37, 2) = std::numeric_limits<float>::quiet_NaN();
+  double certified = infinity;
+  term.quadratic_form(x, p, 1.0, certified);
+  CHECK(certified == 0);
+}
+
+TEST_CASE("a list of terms certifies for those of its terms that can", "[fem]") {
+  Crowd const c = crowd(12, 1, 1, false, false, 3), d = crowd(12, 1, 1, false, false, 4);
+  auto const lame = lame_parameters(1e5, 0.3);
+  ElasticTets<Elastic<NeoHookean>> const first(c.rest, lame), second(d.rest, lame);
+  ElasticTets<Elastic<StableNeoHookean>> const tolerant(c.rest, lame);
+  auto const x = test::to_field(c.x, VectorField<double, DefaultSpace>());
+  auto const p = test::to_field(c.p, VectorField<float, DefaultSpace>());
+  auto const of = [&](auto const& term) {
+    double certified = infinity;
+    term.quadratic_form(x, p, 1.0, certified);
+    return certified;
+  };
+  AnyTerms<> free, both;
+  free.add(tolerant);
+  both.add(first);
+  both.add(tolerant);
+  both.add(second);
+  CHECK(of(tolerant) == infinity);
+  CHECK(of(free) == infinity);
+  CHECK(of(both) == std::min(of(first), of(second)));
+  CHECK(both.max_step(x, p, infinity, of(both)) == both.max_step(x, p, infinity));
+  CHECK(both.max_step(x, p, of(both), of(both)) == of(both));
 }
 
 TEST_CASE("a direction that is not a number allows no step", "[fem]") {

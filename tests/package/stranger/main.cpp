@@ -1,12 +1,10 @@
 // The README's example, word for word: what a stranger writes against the installed package.
 #include <taut/core/fem/body.hpp>
-#include <taut/core/fem/elastic_tets.hpp>
 #include <taut/core/fem/shapes.hpp>
 #include <taut/core/potential/potential.hpp>
 #include <taut/integrators/ncg.hpp>
 #include <taut/integrators/time_stepper.hpp>
-#include <taut/materials/elastic.hpp>
-#include <taut/materials/stable_neo_hookean.hpp>
+#include <taut/presets/elastic.hpp>
 using namespace taut;
 
 int main() {

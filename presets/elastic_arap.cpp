@@ -1,0 +1,9 @@
+#include <taut/presets/elastic.hpp>
+
+namespace taut {
+
+template class ElasticTets<Elastic<Arap>, Fp64>;
+template class ElasticTets<Elastic<Arap>, Mixed>;
+template class ElasticTets<Elastic<Arap>, Fp32>;
+
+}  // namespace taut

@@ -1,0 +1,9 @@
+#include <taut/presets/elastic.hpp>
+
+namespace taut {
+
+template class ElasticTets<Elastic<StableNeoHookean>, Fp64>;
+template class ElasticTets<Elastic<StableNeoHookean>, Mixed>;
+template class ElasticTets<Elastic<StableNeoHookean>, Fp32>;
+
+}  // namespace taut
