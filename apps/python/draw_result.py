@@ -30,6 +30,7 @@ VIEW_ANGLE = 25.0  # degrees, from the lower to the upper edge of the picture
 MARGIN = 0.92  # the part of the picture that the bodies may fill
 AROUND_BODIES = 0.15  # what is framed of an obstacle: as far from the bodies, in their diagonals
 CELLS = 200  # across the picture of a plane
+PIECE, PIECES = 0.04, 60000  # of triangles: their length, in half diagonals of the bodies; how many
 TITLES = {"speed": "speed, m/s", "displacement": "displacement, m"}
 
 
@@ -49,18 +50,69 @@ class Surface:
         self.vertex = np.array(part["vertex"])
         self.object = np.array(part["object"]).astype(int)
         self.mesh = pv.PolyData(np.array(part.points), faces=np.array(part.faces))
+        self.fine = None
 
     def move(self, points):
         self.mesh.points = points[self.vertex]
         self.mesh["Normals"] = np.array(self.mesh.compute_normals(
             cell_normals=False, split_vertices=False, consistent_normals=False)["Normals"])
         self.mesh.point_data.active_normals_name = "Normals"
+        if self.fine is not None:
+            self.follow()
 
-    def object_of_vertex(self, all_objects):
-        """One number per vertex; no vertex is of two objects."""
-        of_vertex = np.zeros(self.mesh.n_points, dtype=int)
-        of_vertex[self.mesh.regular_faces] = all_objects[:, None]
-        return of_vertex
+    def refine(self, length):
+        """Cuts triangles into pieces no longer than that, as far as PIECES allow: light is found at
+        the vertices. What is drawn from here on is `fine`, whose vertices are means of the mesh's."""
+        corners = self.mesh.regular_faces
+        sides = self.mesh.points[corners] - self.mesh.points[np.roll(corners, 1, axis=1)]
+        longest = np.linalg.norm(sides, axis=2).max(axis=1)
+        cuts = np.ones(len(corners), dtype=int)
+        while len(corners) < PIECES:
+            cuts = np.clip(np.ceil(longest / length), 1, 40).astype(int)
+            if (cuts**2).sum() <= PIECES:
+                break
+            length *= 1.2
+        self.corners, self.weights, self.object_of_vertex, faces = [], [], [], []
+        count = 0
+        for n in np.unique(cuts):
+            chosen = np.flatnonzero(cuts == n)
+            i, j = np.array([(i, j) for i in range(n + 1) for j in range(n + 1 - i)]).T
+            number = np.zeros((n + 2, n + 2), dtype=int)
+            number[i, j] = np.arange(len(i))
+            inner = i + j < n
+            up = np.stack([number[i, j], number[i + 1, j], number[i, j + 1]], axis=1)[inner]
+            i2, j2 = i[i + j < n - 1], j[i + j < n - 1]
+            down = np.stack([number[i2 + 1, j2], number[i2 + 1, j2 + 1], number[i2, j2 + 1]], axis=1)
+            cells = np.concatenate([up, down])
+            first = count + len(i) * np.arange(len(chosen))
+            faces.append((first[:, None, None] + cells).reshape(-1, 3))
+            self.corners.append(np.repeat(corners[chosen], len(i), axis=0))
+            self.weights.append(np.tile(np.stack([n - i - j, i, j], axis=1) / n, (len(chosen), 1)))
+            self.object_of_vertex.append(np.repeat(self.object[chosen], len(i)))
+            count += len(i) * len(chosen)
+        self.corners, self.weights, self.object_of_vertex = (
+            np.concatenate(a) for a in (self.corners, self.weights, self.object_of_vertex))
+        self.fine = pv.PolyData.from_regular_faces(np.zeros((count, 3)), np.concatenate(faces))
+        self.fine["colour"] = np.zeros((count, 3), dtype=np.uint8)
+        self.follow()
+
+    def follow(self):
+        self.fine.points = self.mean(self.mesh.points)
+        normals = self.mean(self.mesh["Normals"])
+        normals /= np.maximum(np.linalg.norm(normals, axis=1), 1e-12)[:, None]
+        self.fine["Normals"] = normals
+        self.fine.point_data.active_normals_name = "Normals"
+
+    def mean(self, values):
+        """At the vertices of `fine` from those of the mesh."""
+        weights = self.weights if values.ndim == 1 else self.weights[:, :, None]
+        return (weights * values[self.corners]).sum(axis=1)
+
+    def paint(self, light, base, least):
+        """Colours `fine` as it is in the light that arrives, but at least so much of it."""
+        share = light.share(self.fine.points, self.fine["Normals"])
+        self.fine["colour"][:] = ((least + (1 - least) * share)[:, None] * base).round()
+        self.fine.Modified()
 
 
 class Plane:
@@ -181,6 +233,9 @@ class Picture:
         self.plotter.set_background("#f6f8fa", top="#dfe6ee")
         key = self.place_camera(np.concatenate([bodies, *map(extremes, filter(len, near))]), options)
         self.light = Light(key, [frames.bodies.mesh])
+        for surface in (frames.bodies, frames.obstacles, frames.room):
+            if surface:
+                surface.refine(PIECE * self.reach)
         self.add_bodies()
         self.add_planes()
         self.add_obstacles()
@@ -189,8 +244,8 @@ class Picture:
     def add_bodies(self):
         bodies = self.frames.bodies
         if self.colour == "object":
-            of_vertex = bodies.object_of_vertex(bodies.object)
-            self.base = np.array([rgb(c) for c in COLOURS])[of_vertex % len(COLOURS)]
+            self.base = np.array([rgb(c) for c in COLOURS])[
+                bodies.object_of_vertex % len(COLOURS)]
         else:
             # The scale beside the picture is that of two points that are not seen.
             scale = pv.PolyData(np.tile(self.middle, (2, 1)))
@@ -202,23 +257,20 @@ class Picture:
                                       "color": "#333333", "n_labels": 3, "title_font_size": font,
                                       "label_font_size": font, "width": 0.05, "height": 0.4,
                                       "position_x": 0.9, "position_y": 0.3})
-        bodies.mesh["colour"] = np.zeros((bodies.mesh.n_points, 3), dtype=np.uint8)
-        self.plotter.add_mesh(bodies.mesh, scalars="colour", rgb=True, copy_mesh=False,
+        self.plotter.add_mesh(bodies.fine, scalars="colour", rgb=True, copy_mesh=False,
                               smooth_shading=True, split_sharp_edges=False, ambient=0.56,
                               diffuse=0.62, specular=0.12, specular_power=24)
 
     def add_obstacles(self):
         frames = self.frames
         if frames.obstacles:
-            self.plotter.add_mesh(frames.obstacles.mesh, color=OBSTACLE, opacity=0.3, ambient=0.45,
-                                  diffuse=0.6, specular=0.25, specular_power=30, smooth_shading=True,
-                                  split_sharp_edges=False, copy_mesh=False)
+            self.plotter.add_mesh(frames.obstacles.fine, scalars="colour", rgb=True, opacity=0.35,
+                                  ambient=0.45, diffuse=0.6, specular=0.25, specular_power=30,
+                                  smooth_shading=True, split_sharp_edges=False, copy_mesh=False)
         if frames.room:
-            mesh = frames.room.mesh
-            mesh["colour"] = np.zeros((mesh.n_points, 3), dtype=np.uint8)
-            self.plotter.add_mesh(mesh, scalars="colour", rgb=True, culling="back", ambient=0.75,
-                                  diffuse=0.3, smooth_shading=True, split_sharp_edges=False,
-                                  copy_mesh=False)
+            self.plotter.add_mesh(frames.room.fine, scalars="colour", rgb=True, culling="back",
+                                  ambient=0.75, diffuse=0.3, smooth_shading=True,
+                                  split_sharp_edges=False, copy_mesh=False)
 
     def add_planes(self):
         """Before what lets them be seen through itself: the translucent is drawn in this order."""
@@ -287,24 +339,19 @@ class Picture:
         """The picture of a frame, [height][width][rgb]."""
         frames = self.frames
         frames.load(frame)
-        body = frames.bodies.mesh
-        self.light.aim(body.points)
+        self.light.aim(frames.bodies.mesh.points)
         if self.colour != "object":
-            values = frames.field(self.colour) / (self.top or 1)
+            values = frames.bodies.mean(frames.field(self.colour)) / (self.top or 1)
             self.base = 255 * matplotlib.colormaps["viridis"](values)[:, :3]
-        self.paint(body, self.base, 0.3)
+        frames.bodies.paint(self.light, self.base, 0.3)
+        if frames.obstacles:
+            frames.obstacles.paint(self.light, rgb(OBSTACLE), 0.1)
         if frames.room:
-            self.paint(frames.room.mesh, rgb(WALL), 0.6)
+            frames.room.paint(self.light, rgb(WALL), 0.4)
         self.draw_planes()
         self.plotter.render()
         image = Image.fromarray(self.plotter.screenshot(return_img=True))
         return np.asarray(image.resize(self.size, Image.Resampling.BOX))
-
-    def paint(self, mesh, base, least):
-        """Colours as they are in the light that arrives, but at least so much of it."""
-        shade = least + (1 - least) * self.light.share(mesh.points, mesh["Normals"])
-        mesh["colour"][:] = (shade[:, None] * base).round()
-        mesh.Modified()
 
 
 def blurred(values, width):
