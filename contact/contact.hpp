@@ -63,7 +63,7 @@ public:
                 "taut: the bound of a Contact must satisfy GapBound (contact/step_bound.hpp)");
 
   struct Params {
-    std::optional<double> dhat = {};  ///< m; else 0.3 of the mean edge of the surface at rest
+    std::optional<double> dhat = {};  ///< m; else default_dhat (surface.hpp)
     double cap = 0.5;  ///< of the distance at rest, for pairs of one body (activation.hpp)
     Stiffness_ stiffness = {};
     double mollifier_threshold = EdgeMollifier::default_threshold;
@@ -181,10 +181,6 @@ public:
   }
 
   double dhat() const { return state_->activation.dhat; }
-  /// 0.3 of the mean edge of the surface at rest, m.
-  static double default_dhat(Surface const& surface, std::vector<Point> const& rest) {
-    return 0.3 * edge_lengths(surface, rest).mean;
-  }
   /// Searches, and the calls that did without: for energies and bounds of short motions, and for
   /// bounds of long ones.
   CacheCounters const& energy_counters() const { return state_->near.counters(); }

@@ -85,7 +85,7 @@ public:
                 "(contact/stiffness.hpp)");
 
   struct Params {
-    std::optional<double> dhat = {};  ///< m; else 0.3 of the mean edge of the surface at rest
+    std::optional<double> dhat = {};  ///< m; else default_dhat (surface.hpp)
     Stiffness_ stiffness = {};
     Clearance clearance = {.share = 0.9};  ///< as in Contact
   };
@@ -255,13 +255,13 @@ private:
       if (!(edges.min > 0)) {
         throw Error("obstacle: a surface without edges, or with one of length zero: remove it");
       }
-      check(params, params.dhat.value_or(0.3 * edges.mean));
+      double const dhat = params.dhat.value_or(default_dhat(host, rest));
+      check(params, dhat);
       table.vertex = to_space<Space>("obstacle_vertex", host.vertices);
       object = to_space<Space>("obstacle_object", host.object);
       table.held = Fixed("obstacle_held", host.vertices.size());
       table.rule = params.stiffness;
-      table.fields = {
-          area_of(host, rest), {}, unknowns.fixed, params.dhat.value_or(0.3 * edges.mean)};
+      table.fields = {area_of(host, rest), {}, unknowns.fixed, dhat};
       reducer = Reducer<Space, double>(vertices(), 4);
       place(pose);
     }

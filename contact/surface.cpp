@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <map>
 #include <utility>
 
 namespace taut {
@@ -147,6 +148,20 @@ EdgeLengths edge_lengths(Surface const& surface, std::span<Point const> points) 
   }
   lengths.mean = sum / static_cast<double>(surface.edges.size());
   return lengths;
+}
+
+double default_dhat(Surface const& surface, std::span<Point const> points) {
+  std::map<int, std::pair<double, int>> of_body;  // the length of its edges, and their number
+  for (Edge const& e : surface.edges) {
+    Point const &a = points[e[0]], &b = points[e[1]];
+    auto& [sum, count] = of_body[surface.object[e[0]]];
+    sum += std::hypot(b[0] - a[0], b[1] - a[1], b[2] - a[2]);
+    ++count;
+  }
+  double shortest = INFINITY;
+  for (auto const& [body, edges] : of_body)
+    shortest = std::min(shortest, edges.first / edges.second);
+  return 0.3 * shortest;
 }
 
 }  // namespace taut

@@ -218,34 +218,22 @@ private:
   }
 
   void add_contact(AnySteppedTerms<P, DefaultSpace>& terms, Unknowns<P> const& unknowns) {
-    std::vector<Triangle> triangles = boundary_faces(geometry_.mesh.tets);
-    double const dhat = distance_of_contact(triangles);
-    std::vector<Triangle> of_bodies = triangles;
-    for (Triangle& t : of_bodies)
-      for (auto& v : t) v = order_.new_vertex[v];
+    std::vector<int> const object = object_of_vertex();
+    std::vector<Triangle> triangles;
+    auto const add = [&](Triangle const& t, std::int32_t first) {
+      triangles.push_back({order_.new_vertex[first + t[0]], order_.new_vertex[first + t[1]],
+                           order_.new_vertex[first + t[2]]});
+    };
+    for (Triangle const& t : boundary_faces(geometry_.mesh.tets)) add(t, 0);
+    Surface const bodies = make_surface(triangles, object);
     for_each_surface([&](ObstacleSurface const& surface, std::int32_t first) {
-      for (Triangle const& t : surface.mesh.triangles) {
-        triangles.push_back({t[0] + first, t[1] + first, t[2] + first});
-      }
+      for (Triangle const& t : surface.mesh.triangles) add(t, first);
     });
-    for (Triangle& t : triangles)
-      for (auto& v : t) v = order_.new_vertex[v];
-    std::vector<int> object(size());
-    for_each_surface([&](ObstacleSurface const& surface, std::int32_t first) {
-      for (std::size_t v = 0; v < surface.mesh.points.size(); ++v) {
-        object[order_.new_vertex[first + v]] =
-            static_cast<int>(geometry_.objects.size() + surface.obstacle);
-      }
-    });
-    for (std::size_t k = 0; k < geometry_.objects.size(); ++k) {
-      ObjectPart const& part = geometry_.objects[k];
-      for (int v = 0; v < part.vertices; ++v) {
-        object[order_.new_vertex[part.first_vertex + v]] = static_cast<int>(k);
-      }
-    }
-    Surface const bodies = make_surface(std::move(of_bodies), object);
-    ContactPart<P> part{unknowns, make_surface(std::move(triangles), std::move(object)), {}, dhat};
+    ContactPart<P> part{unknowns, make_surface(std::move(triangles), object), {}, 0};
     for (std::int32_t v : order_.vertices) part.rest.push_back(mesh_.points[v]);
+    // By default after the edges of the bodies, however coarse or fine the obstacles are.
+    double const given = scene_.contact->number("dhat");
+    part.dhat = given > 0 ? given : default_dhat(bodies, part.rest);
     contact_ = add_contact_term<P>(terms, part, *scene_.contact);
     part.surface = bodies;
     for (SceneObstacle const& obstacle : scene_.obstacles) {
@@ -299,12 +287,22 @@ private:
       }
     }
   }
-  /// By default a share of the edges of the bodies, however coarse the obstacles are.
-  double distance_of_contact(std::vector<Triangle> const& bodies) const {
-    double const given = scene_.contact->number("dhat");
-    if (given > 0) return given;
-    Surface const surface = make_surface(bodies, std::vector<int>(size()));
-    return Contact<>::default_dhat(surface, mesh_.points);
+  /// Bodies, then obstacles.
+  std::vector<int> object_of_vertex() const {
+    std::vector<int> object(size());
+    for (std::size_t k = 0; k < geometry_.objects.size(); ++k) {
+      ObjectPart const& part = geometry_.objects[k];
+      for (int v = 0; v < part.vertices; ++v) {
+        object[order_.new_vertex[part.first_vertex + v]] = static_cast<int>(k);
+      }
+    }
+    for_each_surface([&](ObstacleSurface const& surface, std::int32_t first) {
+      for (std::size_t v = 0; v < surface.mesh.points.size(); ++v) {
+        object[order_.new_vertex[first + v]] =
+            static_cast<int>(geometry_.objects.size() + surface.obstacle);
+      }
+    });
+    return object;
   }
   /// A body that is nowhere further from another side of itself than dhat.
   void refuse_small(ObjectPart const& body, double dhat) const {
