@@ -38,6 +38,7 @@ public:
   }
   double time() const override { return 0; }
   int steps() const override { return 0; }
+  std::optional<ContactReport> contact() const override { return {}; }
   std::vector<Point> positions() const override { return solution; }
   std::vector<Point> velocities() const override { return {}; }
   void save(Checkpoint& checkpoint) const override {
