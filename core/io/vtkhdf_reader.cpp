@@ -67,7 +67,8 @@ ResultMesh read_mesh(hid_t file) {
       return number >= 0 && static_cast<std::size_t>(number) < end;
     });
   };
-  if (!below(result.object, result.object_names.size())) throw Error("its cells are of objects that do not exist");
+  if (!below(result.object, result.object_names.size()))
+    throw Error("its cells are of objects that do not exist");
 
   const auto types = hdf5::read_dataset<std::uint8_t>(file, "VTKHDF/Types");
   const std::size_t tets = count_tets(types), triangles = types.size() - tets;
