@@ -111,11 +111,12 @@ void print_contact(Scene const& scene) {
   }
   ContactOptions const& contact = *scene.contact;
   double const dhat = contact.number("dhat");
-  fmt::print("  contact       keeps bodies apart: {} barrier below {}, {} curvature, {}\n",
-             contact.text("barrier"),
-             dhat > 0 ? fmt::format("{:.3g} m", dhat) : "0.3 of the mean edge of the finest surface",
-             contact.text("curvature"),
-             contact.flag("mollifier") ? "parallel edges mollified" : "parallel edges as they are");
+  fmt::print(
+      "  contact       keeps bodies apart: {} barrier below {}, {} curvature, {}\n",
+      contact.text("barrier"),
+      dhat > 0 ? fmt::format("{:.3g} m", dhat) : "0.3 of the mean edge of the finest surface",
+      contact.text("curvature"),
+      contact.flag("mollifier") ? "parallel edges mollified" : "parallel edges as they are");
   fmt::print("                pairs by {}, stiffness {}\n", contact.text("search"),
              contact.text("stiffness"));
   fmt::print("                steps by {}: {}\n", contact.text("bound"),

@@ -89,7 +89,8 @@ std::span<OptionKey const> contact_keys() {
        0.0,
        {.min = 0, .max = 1e9, .unit = "m"},
        {},
-       "distance at which contact begins to act; 0: 0.3 of the mean edge of the finest object's surface"},
+       "distance at which contact begins to act; 0: 0.3 of the mean edge of the finest object's "
+       "surface"},
       {"cap",
        0.5,
        {.min = 0, .max = 1, .open_min = true, .open_max = true},
