@@ -2,8 +2,6 @@
 // energy and momentum (docs/benchmarks: F20).
 #include "sliding_block.hpp"
 
-#include <taut/integrators/newton.hpp>
-
 #include <catch2/catch_test_macros.hpp>
 #include <catch2/generators/catch_generators.hpp>
 #include <catch2/matchers/catch_matchers_floating_point.hpp>
@@ -121,24 +119,6 @@ TEST_CASE("without friction, and without contact, nothing holds a block", "[fric
   run(scene, stepper, 20);
   CHECK_THAT(scene.mean(scene.state.v)[0], WithinRel(g * std::sin(angle) * 20 * h, 1e-3));
   CHECK(scene.friction.report(scene.state.x).contacts == 0);
-}
-
-TEST_CASE("friction serves Newton's method, whose matrix follows its contacts", "[friction]") {
-  using Minimiser = Newton<AssembledPcg, BlockJacobi, SufficientDecrease, DecrementWindow, Fp64>;
-  SlidingBlock::Params const params{.mu = 0.6};
-  SlidingBlock scene(params), other(params);
-  SlidingBlock::Stepper stepper({.stop = {.tolerance = 1e-5}});
-  ImplicitEuler<Minimiser> newton({.stop = {.tolerance = 1e-5}});
-  for (SlidingBlock* s : {&scene, &other}) s->throw_with({0.3, 0, 0.1});
-  for (int step = 0; step < 12; ++step) {
-    run(scene, stepper, 1);
-    auto const report = newton.step(other.potential, other.state, h);
-    CAPTURE(step, to_string(report.stop), report.iterations);
-    REQUIRE(report.converged());
-  }
-  Point const v = scene.mean(scene.state.v), w = other.mean(other.state.v);
-  CHECK(v[0] < 0.25);
-  for (int c = 0; c < 3; ++c) CHECK_THAT(w[c], WithinAbs(v[c], 2e-3));
 }
 
 TEST_CASE("a step of no pass is refused", "[friction]") {
