@@ -262,7 +262,7 @@ TEMPLATE_TEST_CASE("no step that an obstacle allows leaves it", "[obstacle]",
   std::mt19937 random(3);
   std::uniform_real_distribution<double> any(-1, 1);
   int cut = 0;
-  std::vector<Point> const start = to_points(f.x);
+  std::vector<Point> const start = f.scene.x = to_points(f.x);  // as it is stored
   for (int trial = 0; trial < 100; ++trial) {
     double const size = std::pow(10.0, 3 * any(random));
     for (Point& p : f.scene.p)
