@@ -198,13 +198,15 @@ motion = [{ name = "push", start = 0, end = 10, velocity = [-8, 0, 0] }]
     FAIL("the run came to its end");
   } catch (Error const& error) {
     CHECK_THAT(error.what(),
-               ContainsSubstring("what moves by script (hold, press) is held up by ") &&
-                   ContainsSubstring(" of slab") && ContainsSubstring(" of cube"));
+               ContainsSubstring("what moves by script (pin.hold, pin.press) is held up by ") &&
+                   ContainsSubstring(" touch, vert") && ContainsSubstring(" of cube"));
+    // What is squashed touches itself first.
+    if (wholly) CHECK_THAT(error.what(), ContainsSubstring(" of slab"));
   }
   CHECK(run.summary().at("ended") == "stopped by an error");
   int const frames = run.summary().at("frames");
   CHECK(frames >= 5);
   CHECK(run.report().size() == std::size_t(frames));
   CHECK(std::filesystem::exists(run.options.out / "checkpoint.h5"));
-  CHECK(check_command(run.options.out) == 0);
+  if (wholly) CHECK(check_command(run.options.out) == 0);
 }

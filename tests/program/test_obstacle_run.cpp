@@ -43,7 +43,7 @@ motion = [{ velocity = [0, 0.5, 0] }]
 name = "lift"
 shape = { kind = "box", size = [2, 0.4, 2], resolution = 1 }
 translate = [0, -0.2, 0]
-motion = [{ velocity = [0, 1, 0], axis = [0, 1, 0], angular_velocity = 90 }]
+motion = [{ velocity = [0, 1, 0], axis = [0, 1, 0], centre = [0, 0, 0], angular_velocity = 90 }]
 
 [[obstacle]]
 name = "post"
