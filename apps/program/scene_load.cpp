@@ -87,9 +87,6 @@ Scene resolve(SceneValue const& document, std::filesystem::path const& file) {
   for (Section const& force : root.list("force")) scene.forces.push_back(read_force(force, scene));
   if (auto const solver = root.section("solver")) scene.solver = SolverOptions(*solver);
   if (auto const contact = root.section("contact")) scene.contact = ContactOptions(*contact);
-  if (!scene.obstacles.empty() && !scene.contact)
-    throw Error("{}: an obstacle is nothing without contact: add a table [contact]",
-                scene.obstacles.front().where);
   if (auto const output = root.section("output")) scene.output = read_output(*output);
   if (auto const sweep = root.section("sweep")) scene.sweep = read_sweep(*sweep);
   return scene;

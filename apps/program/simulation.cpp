@@ -211,7 +211,12 @@ private:
       });
     }
     AnySteppedTerms<P, DefaultSpace> told;
-    if (scene_.contact) add_contact(told, unknowns);
+    if (scene_.contact) {
+      add_contact(told, unknowns);
+    } else if (!scene_.obstacles.empty()) {
+      throw Error("{}: an obstacle is nothing without contact: add a table [contact]",
+                  scene_.obstacles.front().where);
+    }
     Point const& g = scene_.gravity;
     return ProgramPotential<P>(unknowns, Inertia<P>(unknowns),
                                BodyForce<P>(unknowns, {g[0], g[1], g[2]}), terms, told);
