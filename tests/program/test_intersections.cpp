@@ -226,10 +226,11 @@ translate = [5, 0, 0]
     for (std::int32_t const v : result.triangles[t]) {
       REQUIRE(static_cast<std::size_t>(v) >= bodies);
       Point const& x = result.mesh.points.at(static_cast<std::size_t>(v));
-      CHECK(std::abs(floor ? x[1] + 2 : std::abs(x[0] - 5) - 0.5) < 1e-12);
+      double const from_centre = std::max({std::abs(x[0] - 5), std::abs(x[1]), std::abs(x[2])});
+      CHECK(std::abs(floor ? x[1] + 2 : from_centre - 0.5) < 1e-12);
     }
   }
-  CHECK(std::count(result.object.begin(), result.object.end(), 3) == 12);
+  CHECK(std::count(result.object.begin(), result.object.end(), 3) == 24);
 }
 
 TEST_CASE("a scene that starts with a body in an obstacle is refused, naming both",
