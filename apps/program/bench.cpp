@@ -26,9 +26,9 @@ std::vector<BenchRow> from_json(nlohmann::json const& list) {
 }  // namespace
 
 std::string to_json(std::vector<BenchRow> const& rows) {
-  std::string list;
+  std::vector<Record> records;
   for (BenchRow const& row : rows) {
-    Record record;
+    Record& record = records.emplace_back();
     record.set("material", row.material)
         .set("precision", row.precision)
         .set("threads", row.threads)
@@ -43,9 +43,8 @@ std::string to_json(std::vector<BenchRow> const& rows) {
           .set("resident_bytes", row.resident)
           .set("allocations", row.allocations);
     }
-    list += (list.empty() ? "[" : ",\n ") + to_json(record);
   }
-  return list.empty() ? "[]" : list + "]";
+  return to_json(records);
 }
 
 namespace {

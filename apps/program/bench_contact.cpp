@@ -38,9 +38,9 @@ std::vector<ContactRow> measure_contact(ContactBenchOptions const& options,
 }
 
 std::string to_json(std::vector<ContactRow> const& rows) {
-  std::string list;
+  std::vector<Record> records;
   for (ContactRow const& row : rows) {
-    Record record;
+    Record& record = records.emplace_back();
     record.set("precision", row.precision)
         .set("threads", row.threads)
         .set("kernel", row.kernel)
@@ -61,9 +61,8 @@ std::string to_json(std::vector<ContactRow> const& rows) {
           .set("bound_share", row.bound_share)
           .set("allocations", row.allocations);
     }
-    list += (list.empty() ? "[" : ",\n ") + to_json(record);
   }
-  return list.empty() ? "[]" : list + "]";
+  return to_json(records);
 }
 
 std::vector<ContactRow> contact_rows(std::string const& json) {

@@ -53,6 +53,17 @@ CLI::Option* add_list(CLI::App& command, std::string const& option, std::vector<
   return command.add_option(option, list, help)->delimiter(',')->allow_extra_args(false);
 }
 
+/// What all benches take.
+template <class Options>
+void add_bench(CLI::App& command, Options& options, std::string const& quick) {
+  add_list(command, "--precisions", options.precisions, "fp32, mixed, fp64");
+  command.add_option("--seconds", options.seconds, "spent on each number")->capture_default_str();
+  command.add_flag("--json", options.json, "a JSON list of rows");
+  command.add_flag("--quick", options.quick, quick);
+  add_list(command, "--threads", options.threads, "numbers of threads (1 and all)")
+      ->check(CLI::Range(1, 4096));
+}
+
 /// A first argument that is no command: the nearest one, if there is any.
 std::optional<std::string> unknown_command(CLI::App const& app, int argc, char** argv) {
   if (argc < 2 || argv[1][0] == '-') return {};
@@ -175,33 +186,21 @@ int main(int argc, char** argv) {
   bench_app->require_subcommand(1);
   bench_app->footer("example: taut bench elastic --quick");
   add_list(*elastic_app, "--materials", bench.materials, "models (all)");
-  add_list(*elastic_app, "--precisions", bench.precisions, "fp32, mixed, fp64");
   add_list(*elastic_app, "--tets", bench.tets, "sizes of the mesh");
-  elastic_app->add_option("--seconds", bench.seconds, "spent on each number")
-      ->capture_default_str();
-  elastic_app->add_flag("--json", bench.json, "a JSON list of rows");
-  elastic_app->add_flag("--quick", bench.quick,
-                        "a small mesh and hasty numbers, where --tets and --seconds say nothing");
+  add_bench(*elastic_app, bench,
+            "a small mesh and hasty numbers, where --tets and --seconds say nothing");
   elastic_app->footer("example: taut bench elastic --materials stable_neo_hookean --tets 500000");
-  add_list(*elastic_app, "--threads", bench.threads, "numbers of threads (1 and all)")
-      ->check(CLI::Range(1, 4096));
   elastic_app->callback([&] { command = [&] { return bench_command(bench); }; });
 
   ContactBenchOptions contact_bench;
   auto* contact_app =
       bench_app->add_subcommand("contact", "search, sweeps and step bounds of contact");
-  add_list(*contact_app, "--precisions", contact_bench.precisions, "fp32, mixed, fp64");
   add_list(*contact_app, "--contacts", contact_bench.contacts, "about so many pairs that act");
   contact_app->add_option("--iterations", contact_bench.iterations, "of a step")
       ->capture_default_str();
-  contact_app->add_option("--seconds", contact_bench.seconds, "spent on each number")
-      ->capture_default_str();
-  contact_app->add_flag("--json", contact_bench.json, "a JSON list of rows");
-  contact_app->add_flag("--quick", contact_bench.quick,
-                        "a small scene and haste, where --contacts and --seconds say nothing");
+  add_bench(*contact_app, contact_bench,
+            "a small scene and haste, where --contacts and --seconds say nothing");
   contact_app->footer("example: taut bench contact --contacts 100000 --threads 2");
-  add_list(*contact_app, "--threads", contact_bench.threads, "numbers of threads (1 and all)")
-      ->check(CLI::Range(1, 4096));
   contact_app->callback([&] { command = [&] { return bench_contact_command(contact_bench); }; });
 
   for (CLI::App* sub : app.get_subcommands({})) {

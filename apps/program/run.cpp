@@ -19,6 +19,7 @@
 #include <algorithm>
 #include <csignal>
 #include <optional>
+#include <span>
 
 namespace taut {
 
@@ -85,9 +86,9 @@ void clear_folder(std::filesystem::path const& folder) {
 
 /// What starts intersecting stays so where there is contact. Where there is none, it may be meant
 /// to: it is warned of, unless the run is to be free of intersections.
-void check_start(Scene const& scene, SceneGeometry& geometry, ObjectIntersections const& surface,
-                 RunOptions const& options) {
-  auto const found = surface.find(result_mesh(scene, geometry).mesh.points);
+void check_start(Scene const& scene, SceneGeometry& geometry, std::span<Point const> start,
+                 ObjectIntersections const& surface, RunOptions const& options) {
+  auto const found = surface.find(start);
   if (found.empty()) return;
   std::string const what =
       fmt::format("{}: the scene starts with {}; the first: {}", scene.file.string(),
@@ -398,8 +399,9 @@ private:
 int run_command(RunOptions const& options) {
   Scene const scene = load_scene(find_scene(options.scene.scene), options.scene.changes);
   SceneGeometry geometry = build_within_memory(scene);
-  ObjectIntersections const surface(result_mesh(scene, geometry));
-  check_start(scene, geometry, surface, options);
+  ResultMesh const start = result_mesh(scene, geometry);
+  ObjectIntersections const surface(start);
+  check_start(scene, geometry, start.mesh.points, surface, options);
   for (std::string const& warning : geometry.warnings) fmt::print(stderr, "warning: {}\n", warning);
   return Run(scene, geometry, options, options.check == CheckRun::off ? nullptr : &surface).run();
 }

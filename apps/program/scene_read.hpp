@@ -19,6 +19,9 @@ std::filesystem::path find_data(SceneValue const& value, std::string_view path,
                                 std::filesystem::path const& scene_file);
 
 enum class ShapeOf { object, obstacle };
+/// Whether an object or obstacle has a shape; else it has a mesh. Throws Error for both and
+/// neither.
+bool has_shape(Section const& section);
 /// The table `shape`; `factor` is of its resolution.
 ProceduralShape read_shape(Section const& shape, double factor, ShapeOf owner);
 /// The keys `scale`, `rotate` and `translate`.

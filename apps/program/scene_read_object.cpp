@@ -158,15 +158,10 @@ std::vector<SceneObject> read_object(Section const& section, Scene const& scene)
   SceneObject object;
   object.where = section.where();
   object.name = object.copy_of = section.text("name");
-  auto const shape = section.section("shape");
-  SceneValue const* mesh = section.find("mesh");
-  if (shape.has_value() == (mesh != nullptr))
-    throw Error("{} has {}: give either a shape or a mesh", section.where(),
-                mesh ? "both a shape and a mesh" : "no geometry");
-  if (shape)
-    object.geometry = read_shape(*shape, scene.resolution, ShapeOf::object);
+  if (has_shape(section))
+    object.geometry = read_shape(*section.section("shape"), scene.resolution, ShapeOf::object);
   else
-    object.geometry = find_data(*mesh, section.path("mesh"), scene.file);
+    object.geometry = find_data(section.at("mesh"), section.path("mesh"), scene.file);
   object.scale = read_scale(section);
   object.placement = read_placement(section);
   if (auto const velocity = section.section("velocity")) object.velocity = read_velocity(*velocity);

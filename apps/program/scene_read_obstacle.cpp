@@ -59,15 +59,10 @@ SceneObstacle read_obstacle(Section const& section, Scene const& scene) {
   obstacle.name = section.text("name");
   obstacle.scale = read_scale(section);
   obstacle.placement = read_placement(section);
-  auto const shape = section.section("shape");
-  SceneValue const* mesh = section.find("mesh");
-  if (shape.has_value() == (mesh != nullptr))
-    throw Error("{} has {}: give either a shape or a mesh", section.where(),
-                mesh ? "both a shape and a mesh" : "no geometry");
-  if (shape)
-    obstacle.geometry = read_geometry(*shape, obstacle, scene);
+  if (has_shape(section))
+    obstacle.geometry = read_geometry(*section.section("shape"), obstacle, scene);
   else
-    obstacle.geometry = find_data(*mesh, section.path("mesh"), scene.file);
+    obstacle.geometry = find_data(section.at("mesh"), section.path("mesh"), scene.file);
   obstacle.motion = read_motion(section);
   if (section.find("friction"))
     obstacle.friction = section.number("friction", {.min = 0, .max = 100});

@@ -133,6 +133,14 @@ int scaled(Shape const& shape, int resolution, double factor) {
 
 }  // namespace
 
+bool has_shape(Section const& section) {
+  bool const shape = section.find("shape") != nullptr, mesh = section.find("mesh") != nullptr;
+  if (shape == mesh)
+    throw Error("{} has {}: give either a shape or a mesh", section.where(),
+                mesh ? "both a shape and a mesh" : "no geometry");
+  return shape;
+}
+
 ProceduralShape read_shape(Section const& section, double factor, ShapeOf owner) {
   Shape const shape = read_shape_kind(section, owner);
   constexpr double most = 1e6;

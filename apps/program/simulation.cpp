@@ -81,8 +81,8 @@ public:
       place(before);
       throw;
     }
-    if (report.stop == Stop::non_finite) place(before);
     if (report.stop == Stop::non_finite) {
+      place(before);
       auto const inverted = inverted_tets(geometry_.mesh, read(reached_));
       throw Error(
           "step {} at {:.6g} s: the energy is not a number any more ({}); use a smaller time.step, "
@@ -292,20 +292,28 @@ private:
       }
     }
   }
-  /// Bodies, then obstacles.
-  std::vector<int> object_of_vertex() const {
-    std::vector<int> object(size());
-    for (std::size_t k = 0; k < geometry_.objects.size(); ++k) {
-      ObjectPart const& part = geometry_.objects[k];
-      for (int v = 0; v < part.vertices; ++v) {
-        object[order_.new_vertex[part.first_vertex + v]] = static_cast<int>(k);
-      }
+  /// Calls visit(number, its first vertex in mesh_, how many) for bodies, and for obstacles that
+  /// are surfaces: these are numbered behind the bodies, as the scene lists all of them.
+  template <class Visit>
+  void for_each_object(Visit const& visit) const {
+    int const bodies = static_cast<int>(geometry_.objects.size());
+    for (int k = 0; k < bodies; ++k) {
+      visit(k, geometry_.objects[k].first_vertex, geometry_.objects[k].vertices);
     }
     for_each_surface([&](ObstacleSurface const& surface, std::int32_t first) {
-      for (std::size_t v = 0; v < surface.mesh.points.size(); ++v) {
-        object[order_.new_vertex[first + v]] =
-            static_cast<int>(geometry_.objects.size() + surface.obstacle);
-      }
+      visit(bodies + static_cast<int>(surface.obstacle), first,
+            static_cast<std::int32_t>(surface.mesh.points.size()));
+    });
+  }
+  std::string const& name_of(int object) const {
+    int const bodies = static_cast<int>(geometry_.objects.size());
+    return object < bodies ? geometry_.objects[object].name
+                           : scene_.obstacles[object - bodies].name;
+  }
+  std::vector<int> object_of_vertex() const {
+    std::vector<int> object(size());
+    for_each_object([&](int number, std::int32_t first, std::int32_t count) {
+      for (std::int32_t v = first; v < first + count; ++v) object[order_.new_vertex[v]] = number;
     });
     return object;
   }
@@ -467,29 +475,18 @@ private:
   /// "vertex 12 of mat, vertices 3, 4, 5 of floor", numbered as in the meshes of the objects.
   std::string names_of(std::vector<int> const& unknowns) const {
     std::string text;
-    for (ObjectPart const& body : geometry_.objects) {
-      std::vector<int> inside;
-      for (int i : unknowns) {
-        int const v = order_.vertices[i] - body.first_vertex;
-        if (v >= 0 && v < body.vertices) inside.push_back(v);
-      }
-      add_vertices(text, inside, body.name);
-    }
-    for_each_surface([&](ObstacleSurface const& surface, std::int32_t first) {
+    for_each_object([&](int number, std::int32_t first, std::int32_t count) {
       std::vector<int> inside;
       for (int i : unknowns) {
         int const v = order_.vertices[i] - first;
-        if (v >= 0 && v < int(surface.mesh.points.size())) inside.push_back(v);
+        if (v >= 0 && v < count) inside.push_back(v);
       }
-      add_vertices(text, inside, scene_.obstacles[surface.obstacle].name);
+      if (inside.empty()) return;
+      text += fmt::format("{}{} {} of {}", text.empty() ? "" : ", ",
+                          inside.size() == 1 ? "vertex" : "vertices", fmt::join(inside, ", "),
+                          name_of(number));
     });
     return text;
-  }
-  static void add_vertices(std::string& text, std::vector<int> const& inside,
-                           std::string const& owner) {
-    if (inside.empty()) return;
-    text += fmt::format("{}{} {} of {}", text.empty() ? "" : ", ",
-                        inside.size() == 1 ? "vertex" : "vertices", fmt::join(inside, ", "), owner);
   }
 
   NewtonReport advance(double h, Observer<P, DefaultSpace> const& observer) {
@@ -530,13 +527,14 @@ private:
     std::vector<Point> to(all.begin(), next);
     for (ObstacleSurface const& surface : geometry_.obstacle_meshes) {
       auto const count = std::ssize(surface.mesh.points);
-      if (surface.drawn_only) {
-        for (Point const& x : surface.mesh.points) {
-          to.push_back(places ? place_of(surface.obstacle)(x) : Point{});
-        }
-      } else {
+      if (!surface.drawn_only) {
         to.insert(to.end(), next, next + count);
         next += count;
+      } else if (places) {
+        RigidMap const place = place_of(surface.obstacle);
+        for (Point const& x : surface.mesh.points) to.push_back(place(x));
+      } else {
+        to.insert(to.end(), count, Point{});
       }
     }
     return to;

@@ -282,6 +282,9 @@ public:
     double const mass = mass_reducer_.template sum<1>("free_mass", size(), free_mass)[0];
     step_ = {mass, unknowns_.length, time_step, has_inertia};
     if constexpr ((SteppedTerm<Terms> || ...)) {
+      bool anyone = false;
+      for_each_of<is_stepped>([&](auto const& term) { anyone = anyone || !holds_nothing(term); });
+      if (!anyone) return;
       StepStart<Precision, Space> const start{x, time_step, stiffness_of_untold(x)};
       for_each_of<is_stepped>([&](auto const& term) { term.begin_step(start); });
     }
@@ -403,7 +406,7 @@ public:
   /// what moves by itself goes its share of the way as well.
   double max_prescribed_step(Positions const& x, Vectors const& p, double at_most) const {
     for_each_swept([&](auto const& term) { at_most = term.max_prescribed_step(x, p, at_most); });
-    return max_advance(x, p, at_most);
+    return at_most;
   }
 
   /// Moves free unknowns by one Newton step on the local terms alone: from x + h v to the predictor
@@ -500,6 +503,13 @@ private:
     for_each_of<is_swept>(visit);
   }
 
+  /// Of a list of terms that is chosen at run time.
+  template <class Term>
+  static bool holds_nothing(Term const& term) {
+    if constexpr (requires { term.empty(); }) return term.empty();
+    return false;
+  }
+
   double max_advance(Positions const& x, Vectors const& p, double at_most) const {
     for_each_of<is_moving>([&](auto const& term) { at_most = term.max_advance(x, p, at_most); });
     return at_most;
@@ -524,10 +534,7 @@ private:
     double shortest = std::numeric_limits<double>::infinity();
     Obstruction by{"an element that is already flat", {}};
     for_each_swept([&](auto const& term) {
-      double reach = term.max_prescribed_step(x, p, 1.0);
-      if constexpr (MovingTerm<std::decay_t<decltype(term)>>) {
-        reach = term.max_advance(x, p, reach);
-      }
+      double const reach = term.max_prescribed_step(x, p, 1.0);
       if (!(reach < shortest)) return;
       shortest = reach;
       if constexpr (ObstructedTerm<std::decay_t<decltype(term)>>) {

@@ -112,7 +112,7 @@ concept MovingTerm = SweptTerm<Term> &&
   /// How far it has still to go, m; 0 once it has arrived.
   { term.motion_left(x) } -> std::convertible_to<double>;
   /// The largest valid fraction, up to `at_most`, of what it has still to go while unknowns move by
-  /// the same fraction of p.
+  /// the same fraction of p. Its max_prescribed_step is that as well.
   { term.max_advance(x, p, at_most) } -> std::convertible_to<double>;
   /// Goes by this fraction; by 1 it arrives.
   {term.advance(at_most)};

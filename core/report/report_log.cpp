@@ -55,6 +55,12 @@ std::string to_json(Record const& record, bool indented) {
   return json_of(record).dump(indented ? 2 : -1, ' ', false, Json::error_handler_t::replace);
 }
 
+std::string to_json(std::vector<Record> const& records) {
+  std::string list;
+  for (Record const& record : records) list += (list.empty() ? "[" : ",\n ") + to_json(record);
+  return list.empty() ? "[]" : list + "]";
+}
+
 JsonLines::JsonLines(std::filesystem::path const& path, std::int64_t first_frame)
     : path_(path), file_(nullptr, &std::fclose) {
   make_parent_folder(path);

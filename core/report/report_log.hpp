@@ -12,6 +12,8 @@ namespace taut {
 
 /// The record as JSON: in one line, or indented.
 std::string to_json(Record const& record, bool indented = false);
+/// A list of records, one per line.
+std::string to_json(std::vector<Record> const& records);
 
 /// Appends lines to a file; each is handed to the operating system at once, so that a kill loses
 /// none.

@@ -158,6 +158,25 @@ inline int intersections(Surface const& surface, std::vector<Point> const& x) {
   return count;
 }
 
+/// The largest error of `numbers` of curvature per vertex (the diagonal, or that and the upper
+/// entries of the diagonal block) against `scale` times the diagonal blocks of a Hessian (3n x 3n,
+/// by rows), over their largest entry.
+template <class Curvature>
+double curvature_error(Curvature const& field, int numbers, std::vector<double> const& hessian,
+                       double scale) {
+  auto const host = Kokkos::create_mirror_view_and_copy(Kokkos::HostSpace(), field);
+  int const row[6] = {0, 1, 2, 0, 1, 0}, column[6] = {0, 1, 2, 1, 2, 2};
+  std::size_t const n = host.extent(0);
+  double stiffest = 0, error = 0;
+  for (std::size_t v = 0; v < n; ++v)
+    for (int k = 0; k < 6; ++k) {
+      double const h = scale * hessian[3 * n * (3 * v + row[k]) + 3 * v + column[k]];
+      stiffest = std::max(stiffest, std::abs(h));
+      if (k < numbers) error = std::max(error, std::abs(double(host(v, k)) - h));
+    }
+  return error / stiffest;
+}
+
 template <class Field>
 std::vector<Point> to_points(Field const& field) {
   auto const host = Kokkos::create_mirror_view_and_copy(Kokkos::HostSpace(), field);

@@ -1,16 +1,12 @@
 // Contact in the program: what the table [contact] makes of a run, and how a run ends that would
 // have to force bodies through each other.
-#include "command_line.hpp"
+#include "scene_run.hpp"
 
-#include <taut/apps/program/commands.hpp>
-#include <taut/core/io/file.hpp>
 #include <taut/core/report/error.hpp>
 
 #include <catch2/generators/catch_generators.hpp>
 #include <catch2/matchers/catch_matchers_exception.hpp>
-#include <nlohmann/json.hpp>
-
-#include <sstream>
+#include <catch2/matchers/catch_matchers_string.hpp>
 
 using namespace taut;
 using namespace taut::test;
@@ -47,26 +43,9 @@ select = { side = "x_min" }
 [contact]
 )";
 
-/// A run of a scene in a folder of its own.
-struct ContactRun {
-  ScratchFolder folder;
-  RunOptions options;
-
-  explicit ContactRun(std::string const& text, std::vector<std::string> overrides = {}) {
-    options.scene.scene = folder.write("scene.toml", text).string();
-    options.scene.changes.overrides = std::move(overrides);
-    options.out = std::filesystem::path(options.scene.scene).parent_path() / "result";
-    options.check = CheckRun::every_iteration;
-  }
-  nlohmann::json summary() const {
-    return nlohmann::json::parse(read_file(options.out / "summary.json"));
-  }
-  std::vector<nlohmann::json> report() const {
-    std::vector<nlohmann::json> lines;
-    std::istringstream text(read_file(options.out / "report.jsonl"));
-    for (std::string line; std::getline(text, line);) lines.push_back(nlohmann::json::parse(line));
-    return lines;
-  }
+struct ContactRun : SceneRun {
+  explicit ContactRun(std::string const& text, std::vector<std::string> overrides = {})
+      : SceneRun("scene.toml", text, std::move(overrides), CheckRun::every_iteration) {}
 };
 
 }  // namespace

@@ -1,17 +1,14 @@
 // Intersections in the program: what `taut check` says of a result, what `taut run` does with a
 // scene that starts with some, and with a step that leaves some.
 #include "command_line.hpp"
+#include "scene_run.hpp"
 
-#include <taut/apps/program/commands.hpp>
 #include <taut/apps/program/intersections.hpp>
 #include <taut/apps/program/scene_result.hpp>
 #include <taut/core/fem/shapes.hpp>
-#include <taut/core/io/file.hpp>
-#include <taut/core/io/vtkhdf.hpp>
 #include <taut/core/report/error.hpp>
 
 #include <catch2/matchers/catch_matchers_exception.hpp>
-#include <nlohmann/json.hpp>
 
 #include <limits>
 
@@ -43,18 +40,8 @@ velocity = { linear = [-10, 0, 0] }
 material = { young = 1e5, poisson = 0.4, density = 1000 }
 )";
 
-struct Collision {
-  ScratchFolder folder;
-  RunOptions options;
-
-  explicit Collision(std::string const& text = collision) {
-    options.scene.scene = folder.write("collision.toml", text).string();
-    options.out = std::filesystem::path(options.scene.scene).parent_path() / "result";
-  }
-  ResultReader result() const { return ResultReader(options.out / "result.vtkhdf"); }
-  nlohmann::json summary() const {
-    return nlohmann::json::parse(read_file(options.out / "summary.json"));
-  }
+struct Collision : SceneRun {
+  explicit Collision(std::string const& text = collision) : SceneRun("collision.toml", text) {}
 };
 
 /// A result of two cubes, the smaller one moved along x from frame to frame.

@@ -1,15 +1,14 @@
 // Obstacles in the result of a run: where they are in every frame, what is written of them, and
 // that the run goes on with them.
-#include "command_line.hpp"
+#include "scene_run.hpp"
 
-#include <taut/apps/program/commands.hpp>
 #include <taut/apps/program/scene_geometry.hpp>
 #include <taut/core/io/mesh_reader.hpp>
-#include <taut/core/io/vtkhdf.hpp>
 #include <taut/core/report/error.hpp>
 
 #include <catch2/matchers/catch_matchers_exception.hpp>
 #include <catch2/matchers/catch_matchers_floating_point.hpp>
+#include <catch2/matchers/catch_matchers_string.hpp>
 
 using namespace taut;
 using namespace taut::test;
@@ -61,18 +60,9 @@ translate = [0, -0.8, 0]
 obj = true
 )";
 
-struct LiftRun {
-  ScratchFolder folder;
-  RunOptions options;
-
-  explicit LiftRun(std::vector<std::string> overrides = {}) {
-    options.scene.scene = folder.write("lift.toml", lift).string();
-    options.scene.changes.overrides = std::move(overrides);
-    options.out = std::filesystem::path(options.scene.scene).parent_path() / "result";
-    options.check = CheckRun::every_iteration;
-  }
-  Scene scene() const { return load_scene(options.scene.scene, options.scene.changes); }
-  ResultReader result() const { return ResultReader(options.out / "result.vtkhdf"); }
+struct LiftRun : SceneRun {
+  explicit LiftRun(std::vector<std::string> overrides = {})
+      : SceneRun("lift.toml", lift, std::move(overrides), CheckRun::every_iteration) {}
 };
 
 }  // namespace

@@ -1,0 +1,42 @@
+// A run of a scene in a folder of its own, and what it leaves there.
+#pragma once
+
+#include "scene_text.hpp"
+
+#include <taut/apps/program/commands.hpp>
+#include <taut/core/io/file.hpp>
+#include <taut/core/io/vtkhdf.hpp>
+
+#include <nlohmann/json.hpp>
+
+#include <sstream>
+#include <vector>
+
+namespace taut::test {
+
+struct SceneRun {
+  ScratchFolder folder;
+  RunOptions options;
+
+  /// `name`: of the scene's file, as messages call it.
+  SceneRun(std::string const& name, std::string const& text,
+           std::vector<std::string> overrides = {}, CheckRun check = CheckRun::off) {
+    options.scene.scene = folder.write(name, text).string();
+    options.scene.changes.overrides = std::move(overrides);
+    options.out = std::filesystem::path(options.scene.scene).parent_path() / "result";
+    options.check = check;
+  }
+  Scene scene() const { return load_scene(options.scene.scene, options.scene.changes); }
+  ResultReader result() const { return ResultReader(options.out / "result.vtkhdf"); }
+  nlohmann::json summary() const {
+    return nlohmann::json::parse(read_file(options.out / "summary.json"));
+  }
+  std::vector<nlohmann::json> report() const {
+    std::vector<nlohmann::json> lines;
+    std::istringstream text(read_file(options.out / "report.jsonl"));
+    for (std::string line; std::getline(text, line);) lines.push_back(nlohmann::json::parse(line));
+    return lines;
+  }
+};
+
+}  // namespace taut::test
