@@ -20,9 +20,19 @@
 
 namespace taut {
 
+/// Boxes that are neighbours ask together, up to eight of them.
+struct QueryGroup {
+  static constexpr int most = 8;
+  int count = 0;
+  SearchBox box[most];
+  SizeClass least[most];
+};
+
 /// A set of boxes that is searched from kernels; copied to the device.
 /// `visit(box, least, visitor)` calls `visitor(j)` once for each box j of the set that overlaps
 /// `box` and is in the size class `least` or above, in any order; it may show smaller ones too.
+/// An index may also have `visit_group(group, visitor)`, which calls `visitor(a, j)` for box a of a
+/// group: it goes through the set once for all of them.
 template <class I>
 concept BoxIndex = requires(I const& index, SearchBox const& box, SizeClass least,
                             void (*visitor)(int)) {
@@ -85,21 +95,25 @@ struct Held {
 };
 
 /// Of what pairs are made. `vertices(i, j, v)` are those of the pair that box i of those that ask
-/// and box j of those that are asked for make; `accept(i, j)` says whether it is one.
+/// and box j of those that are asked for make; `accept(asker(i), j)` says whether it is one.
 template <class S>
 struct PairPointTriangle {
   static constexpr PairKind kind = PairKind::point_triangle;
   SurfaceViews<S> surface;
   Held<S> held;
 
+  struct Asker {
+    int vertex;
+  };
+  KOKKOS_FUNCTION Asker asker(int i) const { return {surface.vertex(i)}; }
   KOKKOS_FUNCTION SizeClass least(int) const { return smallest_class; }
   KOKKOS_FUNCTION void vertices(int i, int j, int (&v)[4]) const {
     v[0] = surface.vertex(i);
     for (int a = 0; a < 3; ++a) v[1 + a] = surface.triangle(3 * j + a);
   }
-  KOKKOS_FUNCTION bool accept(int i, int j) const {
-    int v[4];
-    vertices(i, j, v);
+  KOKKOS_FUNCTION bool accept(Asker const& i, int j) const {
+    int const v[4] = {i.vertex, surface.triangle(3 * j), surface.triangle(3 * j + 1),
+                      surface.triangle(3 * j + 2)};
     return v[0] != v[1] && v[0] != v[2] && v[0] != v[3] && !held(v);
   }
 };
@@ -111,6 +125,13 @@ struct PairEdgeEdge {
   Held<S> held;
   Kokkos::View<SearchBox const*, typename S::memory> box;
 
+  struct Asker {
+    int index, vertex[2];
+    SizeClass least;
+  };
+  KOKKOS_FUNCTION Asker asker(int i) const {
+    return {i, {surface.edge(2 * i), surface.edge(2 * i + 1)}, least(i)};
+  }
   KOKKOS_FUNCTION SizeClass least(int i) const { return size_class(longest_side(box(i))); }
   KOKKOS_FUNCTION void vertices(int i, int j, int (&v)[4]) const {
     int const first = Kokkos::min(i, j), second = Kokkos::max(i, j);
@@ -119,68 +140,113 @@ struct PairEdgeEdge {
       v[2 + a] = surface.edge(2 * second + a);
     }
   }
-  KOKKOS_FUNCTION bool accept(int i, int j) const {
-    SizeClass const class_i = least(i), class_j = least(j);
-    if (class_i != class_j ? class_i > class_j : i >= j) return false;
-    int v[4];
-    vertices(i, j, v);
-    bool const shared = v[0] == v[2] || v[0] == v[3] || v[1] == v[2] || v[1] == v[3];
-    return !shared && !held(v);
+  KOKKOS_FUNCTION bool accept(Asker const& i, int j) const {
+    int const v[4] = {i.vertex[0], i.vertex[1], surface.edge(2 * j), surface.edge(2 * j + 1)};
+    if (v[0] == v[2] || v[0] == v[3] || v[1] == v[2] || v[1] == v[3]) return false;
+    SizeClass const class_j = least(j);
+    bool const asks = i.least != class_j ? i.least < class_j : i.index < j;
+    return asks && !held(v);
   }
 };
 
-/// How many pairs box i makes.
+/// Partners of a box that are kept until the lists have their places.
+inline constexpr int noted_partners = 32;
+
+/// What a group of boxes finds: how many partners each has, and the first few of them.
 template <class S, class Index, class Pairing>
-struct CountPairs {
+struct FindPairs {
+  /// On a device each box asks by itself: there the threads are what counts.
+  static constexpr int group = S::on_host ? QueryGroup::most : 1;
+
   Index index;
   Pairing pairing;
   Kokkos::View<SearchBox const*, typename S::memory> box;
-  Kokkos::View<std::int64_t*, typename S::memory> begin;
+  int boxes;
+  Kokkos::View<std::int64_t*, typename S::memory> count;
+  Kokkos::View<int*, typename S::memory> partner;  ///< noted i + k
 
   struct Visitor {
-    Pairing const& pairing;
-    int i;
-    std::int64_t count = 0;
-    KOKKOS_FUNCTION void operator()(int j) {
-      if (pairing.accept(i, j)) ++count;
+    FindPairs const& find;
+    int first;
+    typename Pairing::Asker asker[group];
+    int count[group] = {};
+    KOKKOS_FUNCTION void operator()(int a, int j) {
+      if (!find.pairing.accept(asker[a], j)) return;
+      if (count[a] < noted_partners) find.partner(noted_partners * (first + a) + count[a]) = j;
+      ++count[a];
     }
   };
-  KOKKOS_FUNCTION void operator()(int i) const {
-    Visitor visitor{pairing, i};
-    index.visit(box(i), pairing.least(i), visitor);
-    begin(i) = visitor.count;
+  /// Of an index that takes single boxes.
+  struct One {
+    Visitor& visitor;
+    int a;
+    KOKKOS_FUNCTION void operator()(int j) { visitor(a, j); }
+  };
+  KOKKOS_FUNCTION void operator()(int g) const {
+    Visitor visitor{*this, group * g, {}, {}};
+    int const n = Kokkos::min(group, boxes - group * g);
+    for (int a = 0; a < n; ++a) visitor.asker[a] = pairing.asker(group * g + a);
+    if constexpr (group > 1 && requires(QueryGroup const& q) { index.visit_group(q, visitor); }) {
+      QueryGroup query{n, {}, {}};
+      for (int a = 0; a < n; ++a) {
+        query.box[a] = box(group * g + a);
+        query.least[a] = pairing.least(group * g + a);
+      }
+      index.visit_group(query, visitor);
+    } else {
+      for (int a = 0; a < n; ++a) {
+        int const i = group * g + a;
+        index.visit(box(i), pairing.least(i), One{visitor, a});
+      }
+    }
+    for (int a = 0; a < n; ++a) count(group * g + a) = visitor.count[a];
   }
 };
 
 /// Writes the pairs of box i, by ascending partner.
 template <class S, class Index, class Pairing>
 struct FillPairs {
-  Index index;
-  Pairing pairing;
-  Kokkos::View<SearchBox const*, typename S::memory> box;
-  Kokkos::View<std::int64_t const*, typename S::memory> begin;
+  FindPairs<S, Index, Pairing> find;  ///< `count` is now where the pairs of a box begin
+  std::int64_t total;
   PairIds<S> ids;
 
+  /// For a box with more partners than were noted.
   struct Visitor {
-    Pairing const& pairing;
-    PairIds<S> const& ids;
-    int i;
+    FillPairs const& fill;
+    typename Pairing::Asker asker;
     std::int64_t end;
     KOKKOS_FUNCTION void operator()(int j) {
-      if (pairing.accept(i, j)) ids(end++, 0) = j;
+      if (fill.find.pairing.accept(asker, j)) fill.ids(end++, 0) = j;
     }
   };
   KOKKOS_FUNCTION void operator()(int i) const {
-    // The pairs hold the partners alone until these are sorted.
-    std::int64_t const first = begin(i);
-    Visitor visitor{pairing, ids, i, first};
-    index.visit(box(i), pairing.least(i), visitor);
-    sort(first, visitor.end);
-    for (std::int64_t k = first; k < visitor.end; ++k) {
-      int v[4];
-      pairing.vertices(i, ids(k, 0), v);
-      write_pair(v, ids, k);
+    std::int64_t const first = find.count(i), last = i + 1 < find.boxes ? find.count(i + 1) : total;
+    if (last - first <= noted_partners) {
+      write_noted(i, first, static_cast<int>(last - first));
+    } else {
+      // The pairs hold the partners alone until these are sorted.
+      find.index.visit(find.box(i), find.pairing.least(i),
+                       Visitor{*this, find.pairing.asker(i), first});
+      sort(first, last);
+      for (std::int64_t k = first; k < last; ++k) write(i, ids(k, 0), k);
     }
+  }
+
+private:
+  KOKKOS_FUNCTION void write(int i, int j, std::int64_t k) const {
+    int v[4];
+    find.pairing.vertices(i, j, v);
+    write_pair(v, ids, k);
+  }
+  /// Each has its place by how many are less: without branches, and side by side on the host.
+  KOKKOS_FUNCTION void write_noted(int i, std::int64_t first, int count) const {
+    int partner[noted_partners], less[noted_partners] = {};
+    for (int k = 0; k < noted_partners; ++k) {
+      partner[k] = k < count ? find.partner(noted_partners * i + k) : 0;
+    }
+    for (int m = 0; m < count; ++m)
+      for (int k = 0; k < noted_partners; ++k) less[k] += partner[m] < partner[k] ? 1 : 0;
+    for (int k = 0; k < count; ++k) write(i, partner[k], first + less[k]);
   }
   /// Shell's sort with Knuth's gaps (The Art of Computer Programming 3, section 5.2.1): in place,
   /// and for the few partners that there are mostly, an insertion sort.
@@ -214,7 +280,8 @@ public:
       : boxes_(surface),
         triangles_(params, surface.triangles(), edge_length),
         edges_(params, surface.edges(), edge_length),
-        begin_("candidate_begin", std::max(surface.vertices(), surface.edges())) {}
+        begin_("candidate_begin", std::max(surface.vertices(), surface.edges())),
+        partner_("candidate_partner", kernels::noted_partners * begin_.extent(0)) {}
 
   /// All pairs that come closer than `radius` (m) during the motion, and some that do not. Throws
   /// Error for places that are not finite, and for more pairs than an int can count.
@@ -237,18 +304,21 @@ private:
   template <class Index, class Pairing>
   void ask(BoxSet<Space> const& by, Index const& index, Pairing const& pairing,
            CandidateList<Pairing::kind, Space>& found) const {
-    using Count = kernels::CountPairs<Space, Index, Pairing>;
-    using Fill = kernels::FillPairs<Space, Index, Pairing>;
+    using Find = kernels::FindPairs<Space, Index, Pairing>;
     Kokkos::View<std::int64_t*, typename Space::memory> const begin(begin_,
                                                                     Kokkos::make_pair(0, by.count));
-    for_each<Space>("candidates_count", by.count, Count{index, pairing, by.box, begin});
-    found.resize(exclusive_scan<Space, std::int64_t>("candidates_begin", begin));
-    for_each<Space>("candidates_fill", by.count, Fill{index, pairing, by.box, begin, found.ids()});
+    Find const find{index, pairing, by.box, by.count, begin, partner_};
+    for_each<Space>("candidates_find", (by.count + Find::group - 1) / Find::group, find);
+    std::int64_t const total = exclusive_scan<Space, std::int64_t>("candidates_begin", begin);
+    found.resize(total);
+    for_each<Space>("candidates_fill", by.count,
+                    kernels::FillPairs<Space, Index, Pairing>{find, total, found.ids()});
   }
 
   SurfaceBoxes<Space> boxes_;
   Policy triangles_, edges_;
   Kokkos::View<std::int64_t*, typename Space::memory> begin_;
+  Kokkos::View<int*, typename Space::memory> partner_;
 };
 
 }  // namespace taut

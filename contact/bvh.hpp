@@ -1,16 +1,14 @@
-// A hierarchy of boxes: the boxes in the order of a space-filling curve through their centres
-// (Morton order; Lauterbach et al., "Fast BVH construction on GPUs", 2009) are the leaves of the
-// complete binary tree over them, and each node is the box around its two children. The tree's
-// shape is that of a heap: node k has the children 2 k and 2 k + 1, the leaves are the last level,
-// and no pointer is stored.
+// A hierarchy of boxes, eight to a node: the boxes in the order of a space-filling curve through
+// their centres (Morton order; Lauterbach et al., "Fast BVH construction on GPUs", 2009), eight
+// that follow each other in a bundle; the boxes around bundles, eight in a bundle of the next
+// level; and so on to a single one (Wald et al., "Getting rid of packets", 2008, on trees of such
+// width). No pointer is stored: bundle j of a level is around bundles 8 j to 8 j + 7 of the one
+// below. A query is compared with the eight boxes of a bundle at once, in one register per bound on
+// the host, so it takes few branches that nobody can foresee.
 //
 // Boxes that have moved a little keep their order, and their hierarchy is only computed anew
 // (refitted); it is put in order again when the sum of its boxes' sides has grown by a given factor
 // over what it was after the last sort. What is found depends on neither.
-//
-// A search needs no stack: after a node, or after the subtree of it that was passed over, comes the
-// right sibling of the lowest of its ancestors (or itself) that is a left child. In k + 1 the
-// trailing zero bits are the levels to go up.
 #pragma once
 
 #include <taut/contact/broad_phase.hpp>
@@ -55,50 +53,109 @@ struct CurvePlaces {
   }
 };
 
-/// The box and the largest size class of what is below a node.
-template <class S>
-struct BvhNodes {
-  Kokkos::View<SearchBox*, typename S::memory> box;
-  Kokkos::View<SizeClass*, typename S::memory> largest;
-};
-
 inline constexpr SizeClass no_class = smallest_class - 1;
 
-/// Leaf k, or an empty one beyond the last box.
+/// Eight boxes, bound by bound, and the largest size class of what is in each.
+struct BoxBundle {
+  static constexpr int size = 8;
+  float low[3][size], high[3][size];
+  SizeClass largest[size];
+
+  /// Bit b is set if box b overlaps `query` and holds something of the class `least` or above.
+  KOKKOS_FORCEINLINE_FUNCTION unsigned overlapping(SearchBox const& query, SizeClass least) const {
+    int bit[size];
+    for (int b = 0; b < size; ++b) {
+      int here = static_cast<int>(largest[b] >= least);
+      for (int c = 0; c < 3; ++c) {
+        here &= static_cast<int>(low[c][b] <= query.high[c]) &
+                static_cast<int>(query.low[c] <= high[c][b]);
+      }
+      bit[b] = here << b;
+    }
+    unsigned bits = 0;
+    for (int b = 0; b < size; ++b) bits |= static_cast<unsigned>(bit[b]);
+    return bits;
+  }
+  KOKKOS_FUNCTION void set(int b, SearchBox const& box, SizeClass largest_in_it) {
+    for (int c = 0; c < 3; ++c) {
+      low[c][b] = box.low[c];
+      high[c][b] = box.high[c];
+    }
+    largest[b] = largest_in_it;
+  }
+  KOKKOS_FUNCTION SearchBox box(int b) const {
+    return {{low[0][b], low[1][b], low[2][b]}, {high[0][b], high[1][b], high[2][b]}};
+  }
+  /// Around all of them.
+  KOKKOS_FUNCTION SearchBox all() const {
+    SearchBox result = empty_box();
+    for (int b = 0; b < size; ++b) result = join(result, box(b));
+    return result;
+  }
+  KOKKOS_FUNCTION SizeClass largest_of_all() const {
+    SizeClass result = no_class;
+    for (int b = 0; b < size; ++b) result = Kokkos::max(result, largest[b]);
+    return result;
+  }
+};
+
+/// Bundle g of boxes; what is left of the last one is empty.
 template <class S>
-struct BvhLeaves {
-  Kokkos::View<SearchBox const*, typename S::memory> from;
+struct BundleBoxes {
+  Kokkos::View<SearchBox const*, typename S::memory> box;
   Kokkos::View<int const*, typename S::memory> order;
-  BvhNodes<S> node;
-  int count, leaves;
-  KOKKOS_FUNCTION void operator()(int k) const {
-    SearchBox const box = k < count ? from(order(k)) : empty_box();
-    node.box(leaves + k) = box;
-    node.largest(leaves + k) = k < count ? size_class(longest_side(box)) : no_class;
+  Kokkos::View<BoxBundle*, typename S::memory> bundle;
+  int count;
+  KOKKOS_FUNCTION void operator()(int g) const {
+    for (int b = 0; b < BoxBundle::size; ++b) {
+      int const k = BoxBundle::size * g + b;
+      SearchBox const here = k < count ? box(order(k)) : empty_box();
+      bundle(g).set(b, here, k < count ? size_class(longest_side(here)) : no_class);
+    }
   }
 };
 
-/// Node first + k, from its children.
+/// Bundle g of a level, from the `count` bundles of the one below.
 template <class S>
-struct BvhLevel {
-  BvhNodes<S> node;
-  int first;
-  KOKKOS_FUNCTION void operator()(int k) const {
-    int const n = first + k;
-    node.box(n) = join(node.box(2 * n), node.box(2 * n + 1));
-    node.largest(n) = Kokkos::max(node.largest(2 * n), node.largest(2 * n + 1));
+struct BundleBundles {
+  Kokkos::View<BoxBundle*, typename S::memory> bundle;
+  int first, first_below, count;
+  KOKKOS_FUNCTION void operator()(int g) const {
+    for (int b = 0; b < BoxBundle::size; ++b) {
+      int const k = BoxBundle::size * g + b;
+      if (k < count) {
+        BoxBundle const& below = bundle(first_below + k);
+        bundle(first + g).set(b, below.all(), below.largest_of_all());
+      } else {
+        bundle(first + g).set(b, empty_box(), no_class);
+      }
+    }
   }
 };
 
-/// Sides of the node k + 1, if it is not empty.
+/// Sides of the box around bundle g.
 template <class S>
-struct BvhSides {
-  BvhNodes<S> node;
-  KOKKOS_FUNCTION void operator()(int k, Sums<double, 1>& sum) const {
-    if (node.largest(k + 1) == no_class) return;
-    SearchBox const b = node.box(k + 1);
+struct BundleSides {
+  Kokkos::View<BoxBundle const*, typename S::memory> bundle;
+  KOKKOS_FUNCTION void operator()(int g, Sums<double, 1>& sum) const {
+    SearchBox const b = bundle(g).all();
     for (int c = 0; c < 3; ++c) sum[0] += double(b.high[c]) - double(b.low[c]);
   }
+};
+
+/// Where the levels begin among all bundles, that of the boxes first.
+struct BundleLevels {
+  static constexpr int most = 11;  ///< 8^11 boxes are more than an int can count
+  int begin[most + 1] = {};
+  int count = 0;
+
+  explicit BundleLevels(int boxes = 0) {
+    for (int n = boxes; count == 0 || n > 1; ++count) {
+      n = n / BoxBundle::size + (n % BoxBundle::size > 0);
+      begin[count + 1] = begin[count] + std::max(n, 1);
+    }
+  }
+  KOKKOS_FUNCTION int bundles(int level) const { return begin[level + 1] - begin[level]; }
 };
 
 }  // namespace kernels
@@ -111,37 +168,91 @@ public:
     double growth = 1.3;  ///< of the sides of all nodes, at which the boxes are sorted anew
   };
   struct Index {
-    kernels::BvhNodes<S> node;
+    kernels::BundleLevels levels;
+    Kokkos::View<kernels::BoxBundle const*, typename S::memory> bundle;
     Kokkos::View<int const*, typename S::memory> order;
-    int leaves;
 
     template <class Visitor>
     KOKKOS_FUNCTION void visit(SearchBox const& query, SizeClass least, Visitor&& visitor) const {
-      unsigned k = 1;
-      do {
-        if (node.largest(k) >= least && overlap(query, node.box(k))) {
-          if (k < static_cast<unsigned>(leaves)) {
-            k = 2 * k;
-            continue;
-          }
-          visitor(order(k - static_cast<unsigned>(leaves)));
+      visit_bundles(query, least, One<std::remove_reference_t<Visitor>>{*this, visitor});
+    }
+    /// Goes down with the box around the group; what this meets is compared with all of the group.
+    template <class Visitor>
+    KOKKOS_FUNCTION void visit_group(QueryGroup const& group, Visitor&& visitor) const {
+      kernels::BoxBundle queries;
+      SizeClass least = largest_class;
+      for (int a = 0; a < width; ++a) {
+        queries.set(a, a < group.count ? group.box[a] : empty_box(), 0);
+        if (a < group.count) least = Kokkos::min(least, group.least[a]);
+      }
+      visit_bundles(queries.all(), least,
+                    Group<std::remove_reference_t<Visitor>>{*this, queries, visitor});
+    }
+
+  private:
+    static constexpr int width = kernels::BoxBundle::size;
+    KOKKOS_FUNCTION int partner(int g, int b) const { return order(width * g + b); }
+
+    template <class Visitor>
+    struct One {
+      Index const& index;
+      Visitor& visitor;
+      KOKKOS_FORCEINLINE_FUNCTION void operator()(int g, unsigned bits) const {
+        for (; bits != 0; bits &= bits - 1) visitor(index.partner(g, Kokkos::countr_zero(bits)));
+      }
+    };
+    template <class Visitor>
+    struct Group {
+      Index const& index;
+      kernels::BoxBundle const& queries;
+      Visitor& visitor;
+      KOKKOS_FORCEINLINE_FUNCTION void operator()(int g, unsigned bits) const {
+        for (; bits != 0; bits &= bits - 1) {
+          int const b = Kokkos::countr_zero(bits), j = index.partner(g, b);
+          unsigned asking = queries.overlapping(index.bundle(g).box(b), 0);
+          for (; asking != 0; asking &= asking - 1) visitor(Kokkos::countr_zero(asking), j);
         }
-        ++k;
-        k >>= Kokkos::countr_zero(k);
-      } while (k != 1);
+      }
+    };
+
+    /// Calls found(g, bits) for bundles g of boxes of which some overlap. Depth first, with what is
+    /// still to be visited of one bundle per level.
+    template <class Found>
+    KOKKOS_FUNCTION void visit_bundles(SearchBox const& query, SizeClass least,
+                                       Found const& found) const {
+      int node[kernels::BundleLevels::most];
+      unsigned rest[kernels::BundleLevels::most];
+      int const top = levels.count - 1;
+      int level = top;
+      node[level] = 0;
+      rest[level] = bundle(levels.begin[level]).overlapping(query, least);
+      for (;;) {
+        if (level == 0) {
+          if (rest[0] != 0) found(node[0], rest[0]);
+          rest[0] = 0;
+        }
+        while (rest[level] == 0) {
+          if (level == top) return;
+          ++level;
+        }
+        int const next = width * node[level] + Kokkos::countr_zero(rest[level]);
+        rest[level] &= rest[level] - 1;
+        --level;
+        node[level] = next;
+        rest[level] = bundle(levels.begin[level] + next).overlapping(query, least);
+      }
     }
   };
 
   Bvh() = default;
   Bvh(Params const& params, int count, double)
       : params_(params),
-        leaves_(static_cast<int>(std::bit_ceil(static_cast<unsigned>(std::max(count, 1))))),
-        node_{Kokkos::View<SearchBox*, typename S::memory>("bvh_box", 2 * std::size_t(leaves_)),
-              Kokkos::View<SizeClass*, typename S::memory>("bvh_class", 2 * std::size_t(leaves_))},
+        levels_(count),
+        bundle_("bvh_bundle", levels_.begin[levels_.count]),
         place_("bvh_place", count),
         order_("bvh_order", count),
         sort_(count),
-        reducer_(2 * leaves_, 1) {}
+        reducer_(levels_.begin[levels_.count], 1) {}
 
   void build(BoxSet<S> const& boxes) {
     if (sorts_ > 0) {
@@ -154,24 +265,29 @@ public:
     sorted_sides_ = sides();
     ++sorts_;
   }
-  Index index() const { return {node_, order_, leaves_}; }
+  Index index() const { return {levels_, bundle_, order_}; }
   int sorts() const { return sorts_; }
 
 private:
   void fit(BoxSet<S> const& boxes) const {
-    for_each<S>("bvh_leaves", leaves_,
-                kernels::BvhLeaves<S>{boxes.box, order_, node_, boxes.count, leaves_});
-    for (int first = leaves_ / 2; first > 0; first /= 2) {
-      for_each<S>("bvh_level", first, kernels::BvhLevel<S>{node_, first});
+    for_each<S>("bvh_boxes", levels_.bundles(0),
+                kernels::BundleBoxes<S>{boxes.box, order_, bundle_, boxes.count});
+    for (int l = 1; l < levels_.count; ++l) {
+      for_each<S>("bvh_level", levels_.bundles(l),
+                  kernels::BundleBundles<S>{bundle_, levels_.begin[l], levels_.begin[l - 1],
+                                            levels_.bundles(l - 1)});
     }
   }
   double sides() const {
-    return reducer_.template sum<1>("bvh_sides", 2 * leaves_ - 1, kernels::BvhSides<S>{node_})[0];
+    if (place_.extent(0) == 0) return 0;
+    return reducer_.template sum<1>("bvh_sides", levels_.begin[levels_.count],
+                                    kernels::BundleSides<S>{bundle_})[0];
   }
 
   Params params_;
-  int leaves_ = 1, sorts_ = 0;
-  kernels::BvhNodes<S> node_;
+  kernels::BundleLevels levels_;
+  int sorts_ = 0;
+  Kokkos::View<kernels::BoxBundle*, typename S::memory> bundle_;
   Kokkos::View<std::uint32_t*, typename S::memory> place_;
   Kokkos::View<int*, typename S::memory> order_;
   StableSort<S, std::uint32_t> sort_;

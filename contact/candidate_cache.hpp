@@ -10,12 +10,14 @@
 // pair that is closer than its a at x if m <= reach. Pairs of one body and pairs of two have an m
 // and a reach of their own: bodies that fly at each other make no candidates within themselves.
 // reach = 2 slack lasts until some vertex has moved by more than the slack, or longer: what all do
-// together does not count, a scene in free fall is searched once. Where a motion goes further than
-// that, boxes around the paths of the primitives say which pairs may meet on the way, and for each
-// pair its own relative motion takes the place of the reach: few pairs move as far against each
-// other as the two that do so most. Neighbours in one body, whose
-// boxes overlap for ever, are no candidates unless they come to act: a body far from all others has
-// none.
+// together does not count, a scene in free fall is searched once.
+//
+// Where a motion goes further than that, boxes around the paths of the primitives say which pairs
+// may meet on the way, and to each pair's reach its own relative motion is added: few pairs move as
+// far against each other as the two that do so most. From then on only what departs from that path
+// counts as m, so the step that a line search takes along it needs no other search. Neighbours in
+// one body, whose boxes overlap for ever, are no candidates unless they come to act: a body far
+// from all others has none.
 //
 // The same bound says what cannot touch. A pair of the list does not act at x while m < d - a, with
 // d kept from the search: one number to read instead of four vertices. Where that holds for all,
@@ -42,14 +44,19 @@ struct CacheCounters {
 
 namespace kernels {
 
+/// Remembers where a motion starts, and where it goes.
 template <class Precision, class S>
-struct KeepOrigin {
+struct Depart {
   SurfaceViews<S> surface;
-  VectorField<typename Precision::position, S> x;
-  VectorField<double, S> origin;
+  Motion<Precision, S> motion;
+  Departure<S> to;
   KOKKOS_FUNCTION void operator()(int i) const {
     int const v = surface.vertex(i);
-    for (int c = 0; c < 3; ++c) origin(v, c) = double(x(v, c));
+    Vec3<double> const x = motion.start(v), step = motion.step(v);
+    for (int c = 0; c < 3; ++c) {
+      to.from(v, c) = x[c];
+      to.path(v, c) = step[c];
+    }
   }
 };
 
@@ -64,25 +71,39 @@ struct WithinReach {
   /// Compiled once, as what contact_kernels.hpp computes: which pairs are candidates must not
   /// depend on the number of threads.
   [[gnu::noinline]] KOKKOS_FUNCTION bool operator()(PairKind kind, int const (&v)[4],
-                                                    Vec3<double> const (&y)[4]) const {
+                                                    Vec3<double> const (&y)[4],
+                                                    PairNote& note) const {
+    bool const one_body = activation.one_body(v);
+    double far = one_body ? reach.within : reach.between;
+    if (motion.moves()) far += relative_motion(v, y);
+    double const farthest = activation.dhat + far;
+    if (square_box_gap(kind, y) > (1 + 1e-12) * farthest * farthest) return false;
     double const low = distance_below(kind, y);
-    double far = activation.one_body(v) ? reach.within : reach.between;
-    if (motion.moves()) far = Kokkos::max(far, relative_motion(v, y));
-    if (!(low < activation.dhat + far)) return false;
-    return low < Kokkos::max(activation(kind, v), 0.5 * activation.dhat) + far;
+    if (!(low < farthest)) return false;
+    note.activation = activation(kind, v);
+    note.distance = pair_length(one_body, FoundDistances<S>::shaded(low, y));
+    return low < Kokkos::max(note.activation, 0.5 * activation.dhat) + far;
   }
-  /// Of the vertices of a pair against each other, and what storing their ends may add.
+  /// Of the vertices of a pair against each other, and what storing their ends may add: the
+  /// diagonal of the box around their steps.
   KOKKOS_FUNCTION double relative_motion(int const (&v)[4], Vec3<double> const (&y)[4]) const {
     constexpr double epsilon_x = Kokkos::Experimental::epsilon_v<typename Precision::position>;
     constexpr double epsilon = Kokkos::Experimental::epsilon_v<typename Precision::real>;
     Vec3<double> step[4];
-    double error = 0, longest = 0;
-    for (int a = 0; a < 4; ++a) {
-      step[a] = motion.step(v[a]);
-      error += 4 * epsilon * norm(step[a]) + 2 * epsilon_x * norm(y[a] + step[a]);
-      for (int b = 0; b < a; ++b) longest = Kokkos::max(longest, norm(step[a] - step[b]));
+    for (int a = 0; a < 4; ++a) step[a] = motion.step(v[a]);
+    double square = 0, size = 0, place = 0;
+    for (int c = 0; c < 3; ++c) {
+      double low = step[0][c], high = low;
+      for (int a = 0; a < 4; ++a) {
+        low = Kokkos::min(low, step[a][c]);
+        high = Kokkos::max(high, step[a][c]);
+        size = Kokkos::max(size, Kokkos::abs(step[a][c]));
+        place = Kokkos::max(place, Kokkos::abs(y[a][c] + step[a][c]));
+      }
+      square += (high - low) * (high - low);
     }
-    return longest + error;
+    // Four vertices, each off by no more than sqrt(3) times what its largest component is.
+    return (1 + 1e-15) * Kokkos::sqrt(square) + 7 * (4 * epsilon * size + 2 * epsilon_x * place);
   }
   /// The distance, less the round-off of computing it.
   KOKKOS_FUNCTION static double distance_below(PairKind kind, Vec3<double> const (&y)[4]) {
@@ -107,29 +128,36 @@ struct LongestStep {
   }
 };
 
-/// Notes the distance of pair k, and lowers to what is left of it beyond activation, of pairs of
-/// one body or of two.
-template <PairKind kind, class S, class Positions>
-struct LeastClearance {
-  PairIds<S> ids;
-  Positions x;
-  Activation<S> activation;
-  Array<float, S> distance;
-  bool one_body;
-  KOKKOS_FUNCTION void operator()(int k, double& least) const {
-    least = Kokkos::min(least, note(k, least));
+/// Lowers to the first vertex of the mesh that goes as far.
+template <class Precision, class S>
+struct FindLeader {
+  LongestStep<Precision, S> step;
+  double longest;
+  KOKKOS_FUNCTION void operator()(int i, int& first) const {
+    if (step.length(i) >= longest) first = Kokkos::min(first, step.surface.vertex(i));
   }
-  /// Compiled once, as well. What is left, or `other` of a pair of the other sort.
-  [[gnu::noinline]] KOKKOS_FUNCTION double note(int k, double other) const {
-    int v[4];
-    read_pair(ids, k, v);
-    bool const one = activation.one_body(v);
-    if (one != one_body) return other;
-    Vec3<double> y[4];
-    gather(v, x, y);
-    double const low = WithinReach<Fp64, S>::distance_below(kind, y);
-    distance(k) = pair_length(one, FoundDistances<S>::shaded(low, y));
-    return low - activation(kind, v);
+};
+
+/// Lowers to what is left of the distances of pairs beyond activation.
+template <class S>
+struct LeastClearance {
+  using value_type = Displacement;
+  Array<float, S> distance;
+  Array<double, S> activation;
+  KOKKOS_FUNCTION void operator()(int k, Displacement& least) const {
+    float const d = distance(k);
+    double const left = double(Kokkos::abs(d)) - activation(k);
+    // What is noted as 0 tells no body.
+    if (!(d > 0)) least.within = Kokkos::min(least.within, left);
+    if (!(d < 0)) least.between = Kokkos::min(least.between, left);
+  }
+  KOKKOS_FUNCTION void join(Displacement& to, Displacement const& from) const {
+    to.within = Kokkos::min(to.within, from.within);
+    to.between = Kokkos::min(to.between, from.between);
+  }
+  KOKKOS_FUNCTION void init(Displacement& least) const {
+    constexpr double infinity = Kokkos::Experimental::infinity_v<double>;
+    least = {infinity, infinity};
   }
 };
 
@@ -143,7 +171,7 @@ public:
   using Space = typename Policy::Space;
   using Positions = VectorField<typename Precision::position, Space>;
   struct Params {
-    double slack = 0.25;  ///< of dhat
+    double slack = 0.125;  ///< of dhat
     typename Policy::Params search = {};
   };
 
@@ -156,7 +184,8 @@ public:
         activation_(activation),
         slack_(params.slack * activation.dhat),
         displacements_(surface),
-        origin_("candidate_origin", surface.object.extent(0)) {
+        since_{VectorField<double, Space>("candidate_origin", surface.object.extent(0)),
+               VectorField<double, Space>("candidate_path", surface.object.extent(0))} {
     if (!(activation.dhat > 0 && activation.fraction > 0 && activation.fraction < 1 &&
           params.slack >= 0)) {
       throw Error(
@@ -172,8 +201,9 @@ public:
   /// Error where `find` does.
   Touch update(Motion<Precision, Space> const& motion) {
     if (complete_) {
-      moved_ = displacements_.measure(motion, origin_);
-      complete_ = moved_.within <= reach_.within && moved_.between <= reach_.between;
+      Moved const moved = displacements_.measure(motion, since_);
+      moved_ = moved.all;
+      complete_ = moved.off.within <= reach_.within && moved.off.between <= reach_.between;
     }
     if (complete_) {
       ++counters_.reuses;
@@ -194,8 +224,14 @@ public:
   /// moved against each other by the end of the motion that was last asked for.
   template <PairKind kind>
   FoundDistances<Space> distances() const {
-    return {kind == PairKind::point_triangle ? triangle_distance_ : edge_distance_, moved_};
+    if constexpr (kind == PairKind::point_triangle) {
+      return {candidates_.point_triangle.distance(), moved_};
+    } else {
+      return {candidates_.edge_edge.distance(), moved_};
+    }
   }
+  /// How far vertices may have moved against each other since the search.
+  Displacement const& moved() const { return moved_; }
   CacheCounters const& counters() const { return counters_; }
 
 private:
@@ -205,54 +241,56 @@ private:
     Motion<Precision, Space> at_start = motion;
     at_start.p = {};
     for_each<Space>("candidate_origin", surface.vertices(),
-                    kernels::KeepOrigin<Precision, Space>{surface, motion.x, origin_});
-    moved_ = displacements_.measure(motion, origin_);
+                    kernels::Depart<Precision, Space>{surface, motion, since_});
+    since_.leader = -1;
+    moved_ = displacements_.measure(motion, since_).all;
     double const farthest = displacements_.bodies() > 1 ? moved_.between : moved_.within;
-    // What goes far with all others has a long path and little to meet on it.
-    bool const paths = farthest > 2 * slack_ && longest_step(motion) <= 2 * farthest;
+    bool const paths = farthest > 2 * slack_ && follow(motion, 2 * farthest);
     reach_ = paths ? Displacement{2 * slack_, 2 * slack_}
                    : Displacement{moved_.within + 2 * slack_, moved_.between + 2 * slack_};
     double const radius = activation_.dhat + 2 * slack_ + (paths ? 0 : farthest);
     Motion<Precision, Space> const& along = paths ? motion : at_start;
     search_.find(along, radius, candidates_);
     candidates_.keep(kernels::WithinReach<Precision, Space>{activation_, reach_, along}, motion.x);
-    clear_for_ = reach_;
-    clearance(candidates_.point_triangle, motion.x, triangle_distance_);
-    clearance(candidates_.edge_edge, motion.x, edge_distance_);
+    constexpr double infinity = std::numeric_limits<double>::infinity();
+    clear_for_ = {infinity, infinity};
+    lower_clearance(candidates_.point_triangle);
+    lower_clearance(candidates_.edge_edge);
     complete_ = true;
   }
 
-  double longest_step(Motion<Precision, Space> const& motion) const {
-    return maximum<Space>("candidate_step", search_.surface().vertices(), 0.0,
-                          kernels::LongestStep<Precision, Space>{search_.surface(), motion});
+  /// Names a leader, unless what goes far does so with all others: that has a long path and little
+  /// to meet on it.
+  bool follow(Motion<Precision, Space> const& motion, double at_most) {
+    kernels::LongestStep<Precision, Space> const step{search_.surface(), motion};
+    int const n = search_.surface().vertices();
+    double const longest = maximum<Space>("candidate_step", n, 0.0, step);
+    if (longest > at_most) return false;
+    since_.leader = minimum<Space>("candidate_leader", n, std::numeric_limits<int>::max(),
+                                   kernels::FindLeader<Precision, Space>{step, longest});
+    return true;
   }
 
-  /// Notes the distances of a list and lowers clear_for_.
   template <PairKind kind>
-  void clearance(CandidateList<kind, Space> const& list, Positions const& x,
-                 Array<float, Space>& distance) {
-    if (distance.extent_int(0) < list.count()) {
-      distance = {};  // the old memory first
-      distance = Array<float, Space>(
-          Kokkos::view_alloc(Kokkos::WithoutInitializing, std::string("candidate_distance")),
-          static_cast<std::size_t>(list.count()) + list.count() / 2);
-    }
-    using Least = kernels::LeastClearance<kind, Space, Positions>;
-    for (bool one_body : {true, false}) {
-      double& clear = one_body ? clear_for_.within : clear_for_.between;
-      clear = minimum<Space>("candidate_clearance", list.count(), clear,
-                             Least{list.ids(), x, activation_, distance, one_body});
-    }
+  void lower_clearance(CandidateList<kind, Space> const& list) {
+    if (list.count() == 0) return;
+    kernels::LeastClearance<Space> const find{list.distance(), list.activation()};
+    Displacement least;
+    Kokkos::parallel_reduce(
+        label("candidate_clearance"),
+        Kokkos::RangePolicy<typename Space::execution>(Space::instance(), 0, list.count()), find,
+        least);
+    find.join(clear_for_, least);
   }
 
   PairSearch<Policy> search_;
   Activation<Space> activation_;
   double slack_ = 0;
   Displacements<Space> displacements_;
-  VectorField<double, Space> origin_;
+  Departure<Space> since_;  ///< the last search
   Candidates<Space> candidates_;
-  Array<float, Space> triangle_distance_, edge_distance_;
-  bool complete_ = false;  ///< for the last search's motion, and what has moved by reach_ at most
+  bool complete_ =
+      false;  ///< for the path of the last search, and what is off it by reach_ at most
   Displacement reach_;
   Displacement clear_for_;  ///< nothing acts until so much has moved
   Displacement moved_;      ///< in the motion that was last asked for

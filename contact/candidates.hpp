@@ -3,7 +3,8 @@
 // pair; while nothing grows, nothing is allocated.
 //
 // A list can be cut down to what a filter keeps, in the same order: closeness proper
-// (`CloserThan`), or the paper's exclusion of pairs that are close at rest (activation.hpp).
+// (`CloserThan`), or the paper's exclusion of pairs that are close at rest (activation.hpp). A
+// filter may note what it has computed of the pairs that it keeps.
 #pragma once
 
 #include <taut/contact/closest_features.hpp>
@@ -55,7 +56,31 @@ struct FoundDistances {
   }
 };
 
+/// What a filter computes of a pair on the way.
+struct PairNote {
+  float distance = 0;     ///< m, as FoundDistances::at
+  double activation = 0;  ///< the distance below which the pair acts, m
+};
+
 namespace kernels {
+
+template <class S>
+struct NoteFields {
+  Array<float, S> distance;
+  Array<double, S> activation;
+
+  KOKKOS_FUNCTION PairNote read(int k) const { return {distance(k), activation(k)}; }
+  KOKKOS_FUNCTION void write(int k, PairNote const& note) const {
+    distance(k) = note.distance;
+    activation(k) = note.activation;
+  }
+};
+
+template <class Filter>
+concept NotingFilter = requires(Filter const& filter, int const (&v)[4], Vec3<double> const (&y)[4],
+                                PairNote& note) {
+  filter(PairKind::edge_edge, v, y, note);
+};
 
 template <class Ids>
 KOKKOS_INLINE_FUNCTION void read_pair(Ids const& ids, std::int64_t k, int (&v)[4]) {
@@ -66,19 +91,27 @@ KOKKOS_INLINE_FUNCTION void write_pair(int const (&v)[4], Ids const& ids, std::i
   for (int a = 0; a < 4; ++a) ids(k, a) = v[a];
 }
 
-/// Whether pair k is kept, as 1 or 0.
+/// Whether pair k is kept, as 1 or 0, and what is noted of it.
 template <PairKind kind, class S, class Positions, class Filter>
 struct JudgePairs {
   PairIds<S> ids;
   Positions x;
   Filter filter;
   Kokkos::View<int*, typename S::memory> kept;
+  NoteFields<S> notes;
   KOKKOS_FUNCTION void operator()(int k) const {
     int v[4];
     Vec3<double> y[4];
     read_pair(ids, k, v);
     gather(v, x, y);
-    kept(k) = filter(kind, v, y) ? 1 : 0;
+    if constexpr (NotingFilter<Filter>) {
+      PairNote note;
+      bool const keep = filter(kind, v, y, note);
+      kept(k) = keep ? 1 : 0;
+      if (keep) notes.write(k, note);
+    } else {
+      kept(k) = filter(kind, v, y) ? 1 : 0;
+    }
   }
 };
 
@@ -88,6 +121,7 @@ struct MovePairs {
   PairIds<S> from;
   Kokkos::View<int const*, typename S::memory> place;
   PairIds<S> to;
+  NoteFields<S> notes_from, notes_to;  ///< empty: without
   int count, kept;
   KOKKOS_FUNCTION void operator()(int k) const {
     int const next = k + 1 < count ? place(k + 1) : kept;
@@ -95,6 +129,7 @@ struct MovePairs {
     int v[4];
     read_pair(from, k, v);
     write_pair(v, to, place(k));
+    if (notes_to.distance.extent(0) > 0) notes_to.write(place(k), notes_from.read(k));
   }
 };
 
@@ -107,6 +142,9 @@ public:
   int count() const { return count_; }
   /// `count()` pairs. Valid until the list is changed.
   PairIds<S> ids() const { return PairIds<S>(ids_, Kokkos::make_pair(0, count_), Kokkos::ALL); }
+  /// What the last filter has noted of each, if it was one that notes.
+  Array<float, S> distance() const { return notes_.distance; }
+  Array<double, S> activation() const { return notes_.activation; }
 
   /// Makes room for `count` pairs and takes them for the list; what was in it is lost. Throws Error
   /// if there are more than an int can count.
@@ -121,19 +159,28 @@ public:
     count_ = static_cast<int>(count);
   }
 
-  /// Leaves the pairs for which `filter(kind, v, y)` says so; v are the vertices of a pair and y is
-  /// where these are at `x`.
+  /// Leaves the pairs for which `filter(kind, v, y)`, or `filter(kind, v, y, note)`, says so; v are
+  /// the vertices of a pair and y is where these are at `x`.
   template <class Filter, class Positions>
   void keep(Filter const& filter, Positions const& x) {
     grow(place_, "candidate_place", count_);
     grow(spare_, "candidates", count_);
+    if constexpr (kernels::NotingFilter<Filter>) {
+      for (kernels::NoteFields<S>* notes : {&notes_, &spare_notes_}) {
+        grow(notes->distance, "candidate_distance", count_);
+        grow(notes->activation, "candidate_activation", count_);
+      }
+    } else {
+      notes_ = spare_notes_ = {};
+    }
     for_each<S>("candidates_judge", count_,
-                kernels::JudgePairs<kind, S, Positions, Filter>{ids_, x, filter, place_});
+                kernels::JudgePairs<kind, S, Positions, Filter>{ids_, x, filter, place_, notes_});
     Kokkos::View<int*, typename S::memory> const place(place_, Kokkos::make_pair(0, count_));
     int const kept = exclusive_scan<S, int>("candidates_place", place);
     for_each<S>("candidates_move", count_,
-                kernels::MovePairs<S>{ids_, place, spare_, count_, kept});
+                kernels::MovePairs<S>{ids_, place, spare_, notes_, spare_notes_, count_, kept});
     std::swap(ids_, spare_);
+    std::swap(notes_, spare_notes_);
     count_ = kept;
   }
 
@@ -148,6 +195,7 @@ private:
   }
 
   PairIds<S> ids_, spare_;
+  kernels::NoteFields<S> notes_, spare_notes_;
   Kokkos::View<int*, typename S::memory> place_;
   int count_ = 0;
 };

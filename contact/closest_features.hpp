@@ -180,4 +180,22 @@ KOKKOS_INLINE_FUNCTION ClosestPoints<T> closest_points(PairKind kind, Vec3<T> co
   return kind == PairKind::edge_edge ? closest_edge_edge(y) : closest_point_triangle(y);
 }
 
+/// Between the boxes around the two primitives, squared: no more than their distance, for little.
+template <class T>
+KOKKOS_INLINE_FUNCTION T square_box_gap(PairKind kind, Vec3<T> const (&y)[4]) {
+  bool const edges = kind == PairKind::edge_edge;
+  T sum = T(0);
+  for (int c = 0; c < 3; ++c) {
+    // Vertex 1 belongs to the first edge, or to the triangle.
+    T const low = Kokkos::min(y[2][c], y[3][c]), high = Kokkos::max(y[2][c], y[3][c]);
+    T const first_low = edges ? Kokkos::min(y[0][c], y[1][c]) : y[0][c];
+    T const first_high = edges ? Kokkos::max(y[0][c], y[1][c]) : y[0][c];
+    T const second_low = edges ? low : Kokkos::min(low, y[1][c]);
+    T const second_high = edges ? high : Kokkos::max(high, y[1][c]);
+    T const gap = Kokkos::max(second_low - first_high, first_low - second_high);
+    sum += gap > T(0) ? gap * gap : T(0);
+  }
+  return sum;
+}
+
 }  // namespace taut

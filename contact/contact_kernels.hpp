@@ -47,12 +47,25 @@ struct PairTable {
     read_pair(vertex, k, v);
     gather(v, x, y);
   }
+  /// Whether pair k at y is certainly more than `beyond`, m, out of the reach of its activation: a
+  /// cheap look before all else, since most candidates are.
+  KOKKOS_FUNCTION bool apart(int k, Vec3<double> const (&y)[4], double beyond = 0) const {
+    double const reach = double(activation(k)) + beyond;
+    return square_box_gap(kind(k), y) > reach * reach;
+  }
   template <class Pair>
-  KOKKOS_FUNCTION PairState<Real> evaluate(
-      int k, VectorField<typename Precision::position, S> const& x) const {
+  KOKKOS_FUNCTION PairState<Real> evaluate(int k, Vec3<double> const (&y)[4]) const {
+    return Pair::evaluate(kind(k), parameters(k), y);
+  }
+  /// Whether pair k acts at x; then `s` is its state.
+  template <class Pair>
+  KOKKOS_FUNCTION bool acting(int k, VectorField<typename Precision::position, S> const& x,
+                              PairState<Real>& s) const {
     Vec3<double> y[4];
     read(k, x, y);
-    return Pair::evaluate(kind(k), parameters(k), y);
+    if (apart(k, y)) return false;
+    s = evaluate<Pair>(k, y);
+    return s.at.distance < s.activation;
   }
   KOKKOS_FUNCTION void read_step(int k, VectorField<Real, S> const& p, double alpha,
                                  Vec3<double> (&step)[4]) const {
@@ -69,7 +82,8 @@ struct TakeCandidates {
   int first;
   PairIds<S> ids;
   Array<float, S> distance;  ///< FoundDistances::at
-  Activation<S> activation;
+  Array<double, S> activation;
+  VectorField<double, S> rest_at;
   Rule rule;
   StiffnessFields<Precision, S> fields;
   double mollifier_threshold;
@@ -82,11 +96,11 @@ struct TakeCandidates {
     Vec3<double> rest[4];
     read_pair(ids, i, v);
     write_pair(v, pairs.vertex, k);
-    gather(v, activation.rest, rest);
+    gather(v, rest_at, rest);
     for (int a = 0; a < 4; ++a) vertex_of_slot(4 * k + a) = v[a];
     // What is held exerts nothing: it is a candidate for step bounds alone.
     bool const held = Held<S>{fields.fixed, false}(v);
-    pairs.activation(k) = held ? Real(0) : static_cast<Real>(activation(kind, v));
+    pairs.activation(k) = held ? Real(0) : static_cast<Real>(activation(i));
     float const left = Kokkos::abs(distance(i)) - static_cast<float>(pairs.activation(k));
     pairs.clearance(k) = pair_length(distance(i) < 0, (1 - 1e-6f) * left);
     pairs.stiffness(k) = static_cast<Real>(rule(fields, kind, v));
@@ -98,30 +112,35 @@ struct TakeCandidates {
 
 template <class Pair, class Precision, class S>
 struct PairValue {
+  using Real = typename Precision::real;
   PairTable<Precision, S> pairs;
   VectorField<typename Precision::position, S> x;
   [[gnu::noinline]] KOKKOS_FUNCTION double value(int k) const {
-    auto const s = pairs.template evaluate<Pair>(k, x);
-    return s.at.distance < s.activation ? double(Pair::value(s)) : 0;
+    PairState<Real> s;
+    return pairs.template acting<Pair>(k, x, s) ? double(Pair::value(s)) : 0;
   }
   KOKKOS_FUNCTION void operator()(int k, Sums<double, 1>& sum) const {
     if (!pairs.idle(k)) sum[0] += value(k);
   }
 };
 
+/// How far the vertices of a pair go against each other in a step, or a little more: three for two,
+/// which leaves room for round-off, times their motions against vertex 1.
+KOKKOS_INLINE_FUNCTION double relative_length(Vec3<double> const (&step)[4]) {
+  double longest = 0;
+  for (int a = 0; a < 4; ++a) longest = Kokkos::max(longest, norm(step[a] - step[1]));
+  return 3 * longest;
+}
+
 /// The change of energy by the step that has led to the state `after`; 0 if no pair within it acts.
 template <class Pair, class T>
 KOKKOS_INLINE_FUNCTION double change_of_pair(PairKind kind, PairParameters<T> const& parameters,
                                              PairState<T> const& after,
                                              Vec3<double> const (&step)[4]) {
+  if (double(after.at.distance) > double(after.activation) + relative_length(step)) return 0;
   Vec3<T> moved[4];
-  T longest = T(0);  // against vertex 1; two vertices move against each other by twice that at most
-  for (int a = 0; a < 4; ++a) {
+  for (int a = 0; a < 4; ++a)
     for (int c = 0; c < 3; ++c) moved[a][c] = static_cast<T>(step[a][c] - step[1][c]);
-    longest = max(longest, norm(moved[a]));
-  }
-  // Three for two leaves room for round-off.
-  if (after.at.distance > after.activation + T(3) * longest) return 0;
   return double(Pair::change(kind, parameters, after, moved));
 }
 
@@ -137,9 +156,9 @@ struct PairChange {
     pairs.read(k, x, y);
     pairs.read_step(k, p, alpha, step);
     for (int a = 0; a < 4; ++a) y[a] = y[a] + step[a];
-    auto const kind = pairs.kind(k);
-    auto const parameters = pairs.parameters(k);
-    return change_of_pair<Pair>(kind, parameters, Pair::evaluate(kind, parameters, y), step);
+    if (pairs.apart(k, y, relative_length(step))) return 0;
+    return change_of_pair<Pair>(pairs.kind(k), pairs.parameters(k),
+                                pairs.template evaluate<Pair>(k, y), step);
   }
   KOKKOS_FUNCTION void operator()(int k, Sums<double, 1>& sum) const {
     if (!pairs.idle(k)) sum[0] += change(k);
@@ -171,7 +190,14 @@ struct EvaluatePair {
     return idle;
   }
   [[gnu::noinline]] KOKKOS_FUNCTION double evaluate(int k, bool after_step) const {
-    auto const s = pairs.template evaluate<Pair>(k, x);
+    Vec3<double> y[4], step[4];
+    pairs.read(k, x, y);
+    if (after_step) pairs.read_step(k, p, alpha, step);
+    if (pairs.apart(k, y, after_step ? relative_length(step) : 0)) {
+      to.acts(k) = 0;
+      return 0;
+    }
+    auto const s = pairs.template evaluate<Pair>(k, y);
     bool const acts = s.at.distance < s.activation;
     to.acts(k) = acts ? 1 : 0;
     for (int a = 0; acts && a < 4; ++a) {
@@ -186,10 +212,7 @@ struct EvaluatePair {
         for (int c = 0; c < 6; ++c) to.curvature(4 * k + a, c) = h.s[c];
       }
     }
-    if (!after_step) return 0;
-    Vec3<double> step[4];
-    pairs.read_step(k, p, alpha, step);
-    return change_of_pair<Pair>(pairs.kind(k), pairs.parameters(k), s, step);
+    return after_step ? change_of_pair<Pair>(pairs.kind(k), pairs.parameters(k), s, step) : 0;
   }
 };
 
@@ -214,10 +237,10 @@ struct PairForm {
   VectorField<typename Precision::position, S> x;
   VectorField<Real, S> p;
   [[gnu::noinline]] KOKKOS_FUNCTION double form(int k) const {
+    PairState<Real> s;
+    if (!pairs.template acting<Pair>(k, x, s)) return 0;
     Vec3<double> step[4];
     Vec3<Real> q[4];
-    auto const s = pairs.template evaluate<Pair>(k, x);
-    if (!(s.at.distance < s.activation)) return 0;
     pairs.read_step(k, p, 1, step);
     for (int a = 0; a < 4; ++a)
       for (int c = 0; c < 3; ++c) q[a][c] = static_cast<Real>(step[a][c]);
@@ -263,8 +286,8 @@ struct PairProduct {
   FixedMask<S> fixed;
   ContactSlots<Precision, S> to;
   [[gnu::noinline]] KOKKOS_FUNCTION void multiply(int k) const {
-    auto const s = pairs.template evaluate<Pair>(k, x);
-    bool const acts = s.at.distance < s.activation;
+    PairState<Real> s;
+    bool const acts = pairs.template acting<Pair>(k, x, s);
     to.acts(k) = acts ? 1 : 0;
     if (!acts) return;
     PairHessian<Pair, Real> const h(s);
@@ -309,8 +332,8 @@ struct AssembleRows {
   }
   [[gnu::noinline]] KOKKOS_FUNCTION void add(int v, int slot) const {
     int const k = slot / 4, a = slot % 4;
-    auto const s = pairs.template evaluate<Pair>(k, x);
-    if (!(s.at.distance < s.activation)) return;
+    PairState<Real> s;
+    if (!pairs.template acting<Pair>(k, x, s)) return;
     PairHessian<Pair, Real> const h(s);
     for (int b = 0; b < 4; ++b) {
       int const w = pairs.vertex(k, b);

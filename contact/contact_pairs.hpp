@@ -85,9 +85,7 @@ public:
   /// Takes over what a cache found, unless it has already, and how far that has moved since.
   template <class Cache>
   void take(Cache const& cache) {
-    auto const triangles = cache.template distances<PairKind::point_triangle>();
-    auto const edges = cache.template distances<PairKind::edge_edge>();
-    pairs_.moved = triangles.moved;
+    pairs_.moved = cache.moved();
     std::int64_t const search = cache.counters().searches;
     if (taken_ == search) return;
     Candidates<S> const& candidates = cache.candidates();
@@ -107,8 +105,8 @@ public:
           count);
     }
     resize(static_cast<int>(count), candidates.point_triangle.count());
-    take_kind(0, candidates.point_triangle, triangles);
-    take_kind(pairs_.point_triangles, candidates.edge_edge, edges);
+    take_kind(0, candidates.point_triangle);
+    take_kind(pairs_.point_triangles, candidates.edge_edge);
     sort_.sort(4 * pairs_.count, vertex_of_slot_, static_cast<int>(fields_.area.extent(0)), begin_,
                slot_);
     taken_ = search;
@@ -197,12 +195,11 @@ private:
     reducer_ = Reducer<S, double>(static_cast<int>(n), 1);
   }
   template <PairKind kind>
-  void take_kind(int first, CandidateList<kind, S> const& list,
-                 FoundDistances<S> const& found) const {
+  void take_kind(int first, CandidateList<kind, S> const& list) const {
     using Take = kernels::TakeCandidates<Pair, Rule, Precision, S>;
     for_each<S>("contact_take", list.count(),
-                Take{kind, first, list.ids(), found.at, activation_, rule_, fields_,
-                     mollifier_threshold_, pairs_, vertex_of_slot_});
+                Take{kind, first, list.ids(), list.distance(), list.activation(), activation_.rest,
+                     rule_, fields_, mollifier_threshold_, pairs_, vertex_of_slot_});
   }
 
   using Indices = Kokkos::View<int*, typename S::memory>;

@@ -28,29 +28,59 @@ KOKKOS_FORCEINLINE_FUNCTION float pair_length(bool one_body, float length) {
   return length > 0 ? (one_body ? -length : length) : 0.f;
 }
 
+/// Where the vertices of a mesh were, and a motion from there that has been looked at in full.
+template <class S>
+struct Departure {
+  VectorField<double, S> from;  ///< m
+  VectorField<double, S> path;  ///< m
+  int leader = -1;              ///< a vertex that goes far on its path; -1: none goes anywhere
+};
+
 namespace kernels {
 
-/// The displacements since `origin`, at the start and the end of a motion, give or take the
-/// round-off of both: that of these sums, and that with which the end is stored.
+/// The displacements since a departure, at the start and the end of a motion, give or take the
+/// round-off of both: that of these sums, and that with which the end is stored. And what of them
+/// is off the path: u - s path, s being how far along the leader is, from 0 to 1.
 template <class Precision, class S>
 struct DisplacementCloud {
   Motion<Precision, S> motion;
-  VectorField<double, S> origin;
-  KOKKOS_FUNCTION void add(int v, Bounds& bounds) const {
+  Departure<S> since;
+
+  KOKKOS_FUNCTION double along(bool end) const {
+    int const v = since.leader;
+    if (v < 0) return 0;
+    Vec3<double> x = motion.start(v), path;
+    if (end) x = x + motion.step(v);
+    for (int c = 0; c < 3; ++c) {
+      x[c] -= since.from(v, c);
+      path[c] = since.path(v, c);
+    }
+    return Kokkos::min(Kokkos::max(dot(x, path) / dot(path, path), 0.0), 1.0);
+  }
+  KOKKOS_FUNCTION void add(int v, double s_start, double s_end, Bounds& all, Bounds& off) const {
     constexpr double epsilon_x = Kokkos::Experimental::epsilon_v<typename Precision::position>;
     constexpr double epsilon = Kokkos::Experimental::epsilon_v<typename Precision::real>;
     constexpr double epsilon_here = Kokkos::Experimental::epsilon_v<double>;
-    Vec3<double> const x0{origin(v, 0), origin(v, 1), origin(v, 2)};
     Vec3<double> const x = motion.start(v), step = motion.step(v);
     for (int c = 0; c < 3; ++c) {
-      double const here = 2 * epsilon_here * (Kokkos::abs(x[c]) + Kokkos::abs(x0[c]));
-      extend_axis(bounds, c, x[c] - x0[c], here, v);
+      double const from = since.from(v, c), path = since.leader < 0 ? 0.0 : since.path(v, c);
+      double const size = Kokkos::abs(x[c]) + Kokkos::abs(from) + Kokkos::abs(path);
+      double const here = 2 * epsilon_here * size;
+      extend_axis(all, c, x[c] - from, here, v);
+      extend_axis(off, c, x[c] - from - s_start * path, 2 * here, v);
       if (!motion.moves()) continue;
-      double const size = Kokkos::abs(step[c]), end = x[c] + step[c];
-      double const stored = here + 2 * epsilon * size + epsilon_x * Kokkos::abs(end);
-      extend_axis(bounds, c, end - x0[c], stored, v);
+      double const end = x[c] + step[c];
+      double const stored =
+          here + 2 * epsilon * Kokkos::abs(step[c]) + epsilon_x * Kokkos::abs(end);
+      extend_axis(all, c, end - from, stored, v);
+      extend_axis(off, c, end - from - s_end * path, 2 * stored, v);
     }
   }
+};
+
+/// Bounds of displacements, and of what of them is off a path.
+struct DisplacementBounds {
+  Bounds all, off;
 };
 
 /// The bounds of chunk i of vertices.
@@ -58,14 +88,16 @@ template <class S, class Cloud>
 struct ChunkBounds {
   Cloud cloud;
   Kokkos::View<int const*, typename S::memory> vertex, begin;
-  Kokkos::View<Bounds*, typename S::memory> to;
+  Kokkos::View<DisplacementBounds*, typename S::memory> to;
   KOKKOS_FUNCTION void operator()(int i) const { find(i); }
   /// Compiled once, as what contact_kernels.hpp computes: a bound must not depend on the number of
   /// threads.
   [[gnu::noinline]] KOKKOS_FUNCTION void find(int i) const {
-    Bounds b;
-    FindBounds<int>{}.init(b);
-    for (int k = begin(i); k < begin(i + 1); ++k) cloud.add(vertex(k), b);
+    DisplacementBounds b;
+    FindBounds<int>{}.init(b.all);
+    FindBounds<int>{}.init(b.off);
+    double const start = cloud.along(false), end = cloud.along(true);
+    for (int k = begin(i); k < begin(i + 1); ++k) cloud.add(vertex(k), start, end, b.all, b.off);
     to(i) = b;
   }
 };
@@ -80,10 +112,10 @@ struct ChunkBounds {
   return Kokkos::sqrt(sum) * (1 + 8 * Kokkos::Experimental::epsilon_v<double>);
 }
 
-/// All bounds, and the longest diagonal of one body.
+/// All bounds, and the longest diagonals of one body.
 struct BodyBounds {
-  Bounds all;
-  double longest;
+  DisplacementBounds bounds;
+  double longest, longest_off;
 };
 
 /// Reduces the chunks of body o. Smallest and largest are exact, so their order is free.
@@ -91,26 +123,39 @@ template <class S>
 struct FindBodyBounds {
   using value_type = BodyBounds;
   using Find = FindBounds<int>;  // for its init and join alone
-  Kokkos::View<Bounds const*, typename S::memory> chunk;
+  Kokkos::View<DisplacementBounds const*, typename S::memory> chunk;
   Kokkos::View<int const*, typename S::memory> begin;
   KOKKOS_FUNCTION void operator()(int o, value_type& b) const {
     BodyBounds body;
     init(body);
-    for (int i = begin(o); i < begin(o + 1); ++i) Find{}.join(body.all, chunk(i));
-    body.longest = diagonal(body.all);
+    for (int i = begin(o); i < begin(o + 1); ++i) {
+      Find{}.join(body.bounds.all, chunk(i).all);
+      Find{}.join(body.bounds.off, chunk(i).off);
+    }
+    body.longest = diagonal(body.bounds.all);
+    body.longest_off = diagonal(body.bounds.off);
     join(b, body);
   }
   KOKKOS_FUNCTION void join(value_type& to, value_type const& from) const {
-    Find{}.join(to.all, from.all);
+    Find{}.join(to.bounds.all, from.bounds.all);
+    Find{}.join(to.bounds.off, from.bounds.off);
     to.longest = Kokkos::max(to.longest, from.longest);
+    to.longest_off = Kokkos::max(to.longest_off, from.longest_off);
   }
   KOKKOS_FUNCTION void init(value_type& b) const {
-    Find{}.init(b.all);
-    b.longest = 0;
+    Find{}.init(b.bounds.all);
+    Find{}.init(b.bounds.off);
+    b.longest = b.longest_off = 0;
   }
 };
 
 }  // namespace kernels
+
+/// What has moved since a departure.
+struct Moved {
+  Displacement all;
+  Displacement off;  ///< the path of the departure
+};
 
 /// Measures one surface, again and again; allocates nothing after its construction.
 template <class S>
@@ -132,25 +177,26 @@ public:
     vertex_ = to_space<S>("displacement_vertex", order);
     chunk_ = to_space<S>("displacement_chunk", chunk);
     body_ = to_space<S>("displacement_body", body);
-    bounds_ = Kokkos::View<kernels::Bounds*, typename S::memory>("displacement", chunk.size() - 1);
+    bounds_ = Kokkos::View<kernels::DisplacementBounds*, typename S::memory>("displacement",
+                                                                             chunk.size() - 1);
   }
 
-  /// From `origin` to any time of the motion. Throws Error if a vertex is not at a finite place.
+  /// From a departure to any time of the motion. Throws Error if a vertex is not at a finite place.
   template <class Precision>
-  Displacement measure(Motion<Precision, S> const& motion,
-                       VectorField<double, S> const& origin) const {
-    int const bodies = static_cast<int>(body_.extent(0)) - 1;
+  Moved measure(Motion<Precision, S> const& motion, Departure<S> const& since) const {
+    int const bodies = this->bodies();
     if (bodies < 1) return {};
     using Cloud = kernels::DisplacementCloud<Precision, S>;
     for_each<S>("displacement_chunks", static_cast<int>(bounds_.extent(0)),
-                kernels::ChunkBounds<S, Cloud>{{motion, origin}, vertex_, chunk_, bounds_});
+                kernels::ChunkBounds<S, Cloud>{{motion, since}, vertex_, chunk_, bounds_});
     kernels::BodyBounds result;
     kernels::FindBodyBounds<S> const find{bounds_, body_};
     Kokkos::parallel_reduce(label("displacement_bodies"),
                             Kokkos::RangePolicy<typename S::execution>(S::instance(), 0, bodies),
                             find, result);
-    refuse_stray(result.all);
-    return {result.longest, kernels::diagonal(result.all)};
+    refuse_stray(result.bounds.all);
+    return {{result.longest, kernels::diagonal(result.bounds.all)},
+            {result.longest_off, kernels::diagonal(result.bounds.off)}};
   }
   int bodies() const { return std::max(0, static_cast<int>(body_.extent(0)) - 1); }
 
@@ -159,7 +205,7 @@ private:
   Kokkos::View<int const*, typename S::memory> vertex_;  ///< of the surface, by body
   Kokkos::View<int const*, typename S::memory> chunk_;   ///< first of each, in vertex_
   Kokkos::View<int const*, typename S::memory> body_;    ///< first chunk of each
-  Kokkos::View<kernels::Bounds*, typename S::memory> bounds_;
+  Kokkos::View<kernels::DisplacementBounds*, typename S::memory> bounds_;
 };
 
 }  // namespace taut

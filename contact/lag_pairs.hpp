@@ -21,8 +21,8 @@ struct LagPair {
     return !pairs.idle(k) && lag(k, to);
   }
   [[gnu::noinline]] KOKKOS_FUNCTION bool lag(int k, LaggedContact<Real>& to) const {
-    auto const s = pairs.template evaluate<Pair>(k, x);
-    if (!(s.at.distance < s.activation)) return false;
+    PairState<Real> s;
+    if (!pairs.template acting<Pair>(k, x, s)) return false;
     double const coefficient = mu(object(pairs.vertex(k, 0)), object(pairs.vertex(k, 3)));
     to.limit = static_cast<Real>(coefficient) * -(s.m.value * s.b1);
     to.normal = s.n;

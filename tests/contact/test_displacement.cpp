@@ -81,9 +81,9 @@ TEMPLATE_TEST_CASE("no two vertices have moved further against each other", "[co
         motion.p = to_field<Real, S>(p);
         motion.alpha = alpha;
       }
-      auto const field = to_field<double, S>(origin);
+      Departure<S> const since{to_field<double, S>(origin), {}, -1};
       auto const results =
-          on_one_thread_and_all([&] { return displacements.measure(motion, field); });
+          on_one_thread_and_all([&] { return displacements.measure(motion, since).all; });
       CHECK(results[0].within == results[1].within);
       CHECK(results[0].between == results[1].between);
 
@@ -132,7 +132,11 @@ TEST_CASE("what bodies do as wholes counts between them alone", "[contact]") {
     if (surface.object[v] == 2) x[v][0] += 3;
   }
   Motion<Fp64, S> const motion{to_field<double, S>(x)};
-  Displacement const d = displacements.measure(motion, to_field<double, S>(origin));
+  Departure<S> const since{to_field<double, S>(origin), {}, -1};
+  Moved const moved = displacements.measure(motion, since);
+  Displacement const d = moved.all;
+  CHECK(moved.off.within < 1e-12);
+  CHECK_THAT(moved.off.between, WithinRel(d.between, 1e-12));
   CHECK(d.within < 1e-12);
   CHECK_THAT(d.between, WithinRel(3, 1e-12));
   CHECK(d.of(pair_length(true, 0.5f)) == d.within);
@@ -141,8 +145,50 @@ TEST_CASE("what bodies do as wholes counts between them alone", "[contact]") {
   CHECK(pair_length(false, 0) == 0);
 
   x[4][2] = std::numeric_limits<double>::quiet_NaN();
-  CHECK_THROWS_WITH(
-      displacements.measure(Motion<Fp64, S>{to_field<double, S>(x)}, to_field<double, S>(origin)),
-      ContainsSubstring("vertex 4 is"));
+  CHECK_THROWS_WITH(displacements.measure(Motion<Fp64, S>{to_field<double, S>(x)}, since),
+                    ContainsSubstring("vertex 4 is"));
   CHECK(Displacements<S>(copy_surface<S>(Surface{})).bodies() == 0);
+}
+
+TEST_CASE("what follows a path counts by how far it is off", "[contact]") {
+  Surface const surface = crowd(300, 2);
+  Displacements<S> const displacements(copy_surface<S>(surface));
+  Random random(2);
+  std::size_t const n = surface.object.size();
+  std::vector<Point> origin(n), path(n), astray(n), x(n);
+  for (std::size_t v = 0; v < n; ++v) {
+    origin[v] = in_cube(random, 1);
+    path[v] = in_cube(random, 1);
+    astray[v] = in_cube(random, 0.01);
+  }
+  path[17] = {3, 0, 0};
+  astray[17] = {0, 0, 0};
+  Departure<S> const since{to_field<double, S>(origin), to_field<double, S>(path), 17};
+  auto const at = [&](double s, double by) {
+    for (std::size_t v = 0; v < n; ++v)
+      for (int c = 0; c < 3; ++c) x[v][c] = origin[v][c] + s * path[v][c] + by * astray[v][c];
+    return to_field<double, S>(x);
+  };
+  auto const measure = [&](double s, double by) {
+    return displacements.measure(Motion<Fp64, S>{at(s, by)}, since);
+  };
+  for (double s : {0.0, 0.3, 1.0}) {
+    CAPTURE(s);
+    Moved const along = measure(s, 0);
+    CHECK(along.off.between < 1e-12);
+    CHECK((s == 0) == (along.all.between < 1e-12));
+    CHECK_THAT(
+        measure(s, 1).off.between,
+        WithinRel(displacements.measure(Motion<Fp64, S>{at(0, 1)}, Departure<S>{since.from, {}, -1})
+                      .all.between,
+                  1e-9));
+  }
+  // Beyond either end of the path, what lies beyond counts.
+  CHECK(measure(1.1, 0).off.between > 0.2);
+  CHECK(measure(-0.1, 0).off.between > 0.2);
+  // A motion along the path, from within it to its end and further.
+  Motion<Fp64, S> motion{at(0.4, 0), since.path, 0.6};
+  CHECK(displacements.measure(motion, since).off.between < 1e-12);
+  motion.alpha = 0.7;
+  CHECK(displacements.measure(motion, since).off.between > 0.2);
 }
