@@ -9,10 +9,10 @@
 // No step may be longer than max_step says: then nothing crosses that had not crossed before.
 #pragma once
 
+#include <taut/contact/bvh.hpp>
 #include <taut/contact/candidate_cache.hpp>
 #include <taut/contact/contact_pairs.hpp>
 #include <taut/contact/lag_pairs.hpp>
-#include <taut/contact/spatial_hash.hpp>
 #include <taut/contact/step_bound_sweep.hpp>
 #include <taut/core/potential/term.hpp>
 
@@ -38,9 +38,9 @@ struct LimitingPair {
   double alpha;  ///< the bound; 0: the gap is nil or not above round-off, no step is proved safe
 };
 
-template <class Pair_ = PairEnergy<>, class Search_ = SpatialHash<DefaultSpace>,
-          class Bound_ = AdditiveCcd, class Stiffness_ = ElasticInclusiveStiffness,
-          class Precision_ = Mixed, class Space_ = typename Search_::Space>
+template <class Pair_ = PairEnergy<>, class Search_ = Bvh<DefaultSpace>, class Bound_ = AdditiveCcd,
+          class Stiffness_ = ElasticInclusiveStiffness, class Precision_ = Mixed,
+          class Space_ = typename Search_::Space>
 class Contact {
 public:
   using Pair = Pair_;
@@ -68,8 +68,9 @@ public:
     Stiffness_ stiffness = {};
     double mollifier_threshold = EdgeMollifier::default_threshold;
     Bound_ bound = {};
-    /// As line searches and predictors go half of max_step at most, steps use up half of a gap.
-    Clearance clearance = {.share = 0.9};
+    /// A step leaves this of a gap, or of dhat where the gap is larger: `ample` is no more than
+    /// dhat.
+    Clearance clearance = {.share = 0.45};
     typename Cache::Params search = {};
   };
 
@@ -233,8 +234,9 @@ private:
       portion = edges.mean;
       activation = {params.dhat.value_or(default_dhat(host, rest)), params.cap,
                     copy_points<Space>("contact_rest", rest), surface.object};
+      clearance.ample = std::min(clearance.ample, activation.dhat);
       near = Cache(surface, edges.mean, activation, params.search);
-      brief = 2 * params.search.slack * activation.dhat;
+      brief = std::max(portion, 2 * params.search.slack * activation.dhat);
       swept = Cache(surface, edges.mean, activation, params.search);
       table = Table(surface, activation, params.stiffness, params.mollifier_threshold,
                     vertex_areas(host, rest), fixed);
@@ -278,7 +280,7 @@ private:
 
     /// The bound of a step of at most `length`, that is by `length` times `motion` metres.
     double bounded(Positions const& x, Vectors const& p, double length, double motion) {
-      // The candidates of a motion within the slack are no burden to energies.
+      // The candidates of such a motion are no burden to energies, which follow along it.
       if (length * motion <= brief) return bounded_within(near, x, p, length);
       std::int64_t const searches = swept.counters().searches;
       double const alpha = bounded_within(swept, x, p, length);

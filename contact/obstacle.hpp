@@ -87,7 +87,7 @@ public:
   struct Params {
     std::optional<double> dhat = {};  ///< m; else default_dhat (surface.hpp)
     Stiffness_ stiffness = {};
-    Clearance clearance = {.share = 0.9};  ///< as in Contact
+    Clearance clearance = {.share = 0.45};  ///< as in Contact
   };
 
   /// `surface`: whose vertices the obstacle keeps out; `rest`: where the mesh is at rest, m, one
@@ -257,6 +257,7 @@ private:
       }
       double const dhat = params.dhat.value_or(default_dhat(host, rest));
       check(params, dhat);
+      clearance.ample = std::min(clearance.ample, dhat);
       table.vertex = to_space<Space>("obstacle_vertex", host.vertices);
       object = to_space<Space>("obstacle_object", host.object);
       table.held = Fixed("obstacle_held", host.vertices.size());

@@ -1,5 +1,5 @@
 // How far to go along a direction. A line search moves x and says what it did; every step is kept
-// within a fraction of Objective::max_step, where that is finite.
+// within Objective::max_step, or a fraction of that.
 #pragma once
 
 #include <taut/core/potential/objective.hpp>
@@ -153,7 +153,7 @@ concept LineSearch = requires(L const& search, Line<E>& line, double first) {
 
 /// How steps are kept valid and sane.
 struct StepBound {
-  double fraction = 0.5;  ///< of the largest valid step; infinity: do not ask for it
+  double fraction = 1;  ///< of Objective::max_step; infinity: do not ask for it
   double max_displacement = std::numeric_limits<double>::infinity();  ///< of any unknown, m
   double reach = 10;  ///< the same in Scale::length where curvature may vanish (no inertia)
 

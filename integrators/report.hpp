@@ -14,7 +14,7 @@ enum class Stop {
   none,                      ///< it has not
   converged_by_decrement,    ///< DecrementWindow
   converged_by_energy_drop,  ///< EnergyDrop
-  converged_by_gradient,     ///< GradientNorm, or a gradient that is exactly zero
+  converged_by_gradient,     ///< GradientNorm, DecrementWindow where that is proof, or no gradient
   budget_iterations,
   budget_seconds,
   stalled,  ///< no step along -P g lowers the energy: precision is exhausted, or a bound forbids it

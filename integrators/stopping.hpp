@@ -30,11 +30,12 @@ namespace taut {
 
 /// What is known after a step.
 struct Progress {
-  double decrement = 0;      ///< energy lost in the step (predicted where nothing measured it)
-  double attainable = 0;     ///< the same, had nothing cut or shortened the step
-  double curvature = 1;      ///< lambda, 0 if unknown; rules ask for it without inertia only
-  double gradient_norm = 0;  ///< |M^-1 g|, mass-weighted rms before the step, m
-  double floor = 0;          ///< what round-off makes of the error, m (MinimiserReport)
+  double decrement = 0;   ///< energy lost in the step (predicted where nothing measured it)
+  double attainable = 0;  ///< the same, had nothing cut or shortened the step
+  double curvature = 1;   ///< lambda, 0 if unknown; rules ask for it without inertia only
+  /// |M^-1 g|, mass-weighted rms before the step, m; infinity: unknown.
+  double gradient_norm = std::numeric_limits<double>::infinity();
+  double floor = 0;  ///< what round-off makes of the error, m (MinimiserReport)
   /// The step is no measure of what is left: it cannot end a minimisation.
   bool shortened = false;
   /// No further step is possible; `attainable` stands for all that were to come.
@@ -145,8 +146,9 @@ private:
   double curvature_ = 1;
 };
 
-/// Stops when the estimated error is below `tolerance` lengths. Where round-off forbids that, it
-/// stops as stalled once further steps gain less than round-off costs.
+/// Stops when the estimated error is below `tolerance` lengths, or the gradient says that nothing
+/// is left to do. Where round-off forbids that, it stops as stalled once further steps gain less
+/// than round-off costs.
 class DecrementWindow : public ErrorEstimate {
 public:
   struct Params {
@@ -156,12 +158,28 @@ public:
   DecrementWindow() : DecrementWindow(Params()) {}
   explicit DecrementWindow(Params const& params) : ErrorEstimate(params.window), params_(params) {}
 
+  void start(Scale const& scale) {
+    ErrorEstimate::start(scale);
+    proved_ = std::numeric_limits<double>::infinity();
+  }
+  void forget() {
+    ErrorEstimate::forget();
+    proved_ = std::numeric_limits<double>::infinity();
+  }
   Stop check(Progress const& progress) {
     add(progress);
+    double const tolerance = params_.tolerance * scale_.length;
+    if (scale_.has_inertia && progress.gradient_norm < certain * tolerance && floor_ < tolerance) {
+      proved_ = progress.gradient_norm;
+      return Stop::converged_by_gradient;
+    }
     bool const known = conclusive() || (all_below(negligible()) && !progress.shortened);
     if (!known || params_.tolerance == 0) return Stop::none;
-    if (error_estimate() < params_.tolerance * scale_.length) return Stop::converged_by_decrement;
+    if (error_estimate() < tolerance) return Stop::converged_by_decrement;
     return unfloored_estimate() < 0.25 * floor_ ? Stop::stalled : Stop::none;
+  }
+  double error_estimate() const {
+    return std::max(std::min(unfloored_estimate(), proved_), floor_);
   }
   /// The longest window of such steps amounts to the tolerance. Zero without inertia, where the
   /// curvature that is left along is known too late.
@@ -171,7 +189,13 @@ public:
   }
 
 private:
+  /// With inertia H >= M where the energy is convex, so |M^-1 g| bounds the error before the last
+  /// step: a body that nothing deforms or touches needs no window. Where it is not convex, there is
+  /// this factor to spare.
+  static constexpr double certain = 0.1;
+
   Params params_;
+  double proved_ = std::numeric_limits<double>::infinity();  ///< a bound of the error, m
 };
 
 /// The paper's rule: a step gains less than `tolerance` times what the first one gained.

@@ -236,9 +236,8 @@ private:
                        kernels::StartDirection<Precision, Space>{unknowns.fixed, state.x, x_,
                                                                  unknowns.prescribed, direction_});
     bool const prescribed = moved > 0 || potential.motion_left(state.x) > 0;
-    double bound = potential.max_step(state.x, direction_, 2.0);
-    if (prescribed) bound = potential.max_prescribed_step(state.x, direction_, bound);
-    double const fraction = std::min(1.0, 0.5 * bound);
+    double fraction = potential.max_step(state.x, direction_, 1.0);
+    if (prescribed) fraction = potential.max_prescribed_step(state.x, direction_, fraction);
     for_each<Space>("start", state.size(),
                     kernels::Start<Precision, Space>{unknowns.fixed, state.x, unknowns.prescribed,
                                                      x_, fraction});

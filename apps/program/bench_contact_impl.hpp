@@ -8,8 +8,8 @@
 #include <taut/apps/program/bench_contact_scene.hpp>
 #include <taut/apps/program/bench_memory.hpp>
 #include <taut/apps/program/bench_variants.hpp>
-#include <taut/contact/bvh.hpp>
 #include <taut/contact/contact.hpp>
+#include <taut/contact/spatial_hash.hpp>
 #include <taut/core/report/error.hpp>
 
 namespace taut {
@@ -49,7 +49,7 @@ public:
   using Real = typename P::real;
   using Positions = VectorField<typename P::position, S>;
   using Vectors = VectorField<Real, S>;
-  using Term = Contact<PairEnergy<>, SpatialHash<S>, AdditiveCcd, GivenStiffness, P>;
+  using Term = Contact<PairEnergy<>, Bvh<S>, AdditiveCcd, GivenStiffness, P>;
 
   ContactBench(ContactScene const& scene, ContactBenchOptions const& options,
                MachineRates const& machine)
@@ -202,7 +202,8 @@ private:
     auto swept = cache();
     swept.update({x_, p_, 1, unknowns_.fixed});
     auto const& found = swept.candidates();
-    Clearance const clearance{.share = 0.9};
+    Clearance clearance = typename Term::Params{}.clearance;
+    clearance.ample = scene_.dhat;
     auto const step = [&](auto const& policy) {
       return [&, policy]<PairKind kind>(CandidateList<kind, S> const& list) {
         bound_step<P, S, kind>(policy, clearance, PairList<S>(list.ids()), list.count(), x_, p_,

@@ -6,7 +6,7 @@
 namespace taut {
 
 /// Adds Contact<Pair, Search, Bound> in precision P.
-template <class P, class Pair = PairEnergy<>, class Search = SpatialHash<DefaultSpace>,
+template <class P, class Pair = PairEnergy<>, class Search = Bvh<DefaultSpace>,
           class Bound = AdditiveCcd>
 std::shared_ptr<ProgramContact<P> const> add_contact_of(AnySteppedTerms<P>& terms,
                                                         ContactPart<P> const& part,

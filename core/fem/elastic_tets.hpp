@@ -89,6 +89,9 @@ public:
   void add_to(Matrix const& matrix, Positions const& x, double scale,
               FixedMask<Space> const& fixed) const;
 
+  /// What is used, at most, of the way to where an element inverts.
+  static constexpr double margin = 0.5;
+
   double max_step(Positions const& x, Vectors const& p, double at_most) const {
     if constexpr (Material::allows_inversion) {
       return at_most;
@@ -97,7 +100,7 @@ public:
     }
   }
   double max_step(Positions const& x, Vectors const& p, double at_most, double certified) const {
-    return at_most <= certified ? at_most : max_step(x, p, at_most);
+    return at_most <= margin * certified ? at_most : max_step(x, p, at_most);
   }
   double max_prescribed_step(Positions const& x, Vectors const& p, double at_most) const {
     return step_to_inversion(x, p, at_most, !Material::allows_inversion);
@@ -262,8 +265,10 @@ double ElasticTets<Material, Precision, Space>::step_to_inversion(Positions cons
                                                                   Vectors const& p, double at_most,
                                                                   bool strict) const {
   using Kernel = kernels::InversionSweep<Space, Precision>;
-  run("elastic_max_step", Kernel{{patches_}, x, p, at_most, strict, bounds_});
-  return smallest_bound(at_most);
+  run("elastic_max_step", Kernel{{patches_}, x, p, at_most / margin, strict, bounds_});
+  // What is certified in full is to come back as it was asked for.
+  double const root = smallest_bound(std::numeric_limits<double>::infinity());
+  return root < at_most / margin ? margin * root : at_most;
 }
 
 template <ElementMaterial Material, class Precision, class Space>

@@ -62,9 +62,11 @@ concept Objective =
   { e.pattern(x) } -> std::same_as<BlockCsr<typename E::Space, double>>;
   { e.pattern_version(x) } -> std::convertible_to<std::int64_t>;
   {e.assemble(x, matrix)};
-  /// Largest alpha in (0, at_most] such that x + a p is valid for all a < alpha (an element that
-  /// forbids inversion reaches J = 0 there). Proving a step as long as one wants valid is much
-  /// cheaper than finding the longest one (at_most = infinity).
+  /// A step length in (0, at_most] that may be gone in full: x + a p is valid for all a up to it,
+  /// and every term has kept the margin that it needs to go on from there (half of the way to J = 0
+  /// where that is forbidden, half of a gap). at_most itself, if that is such a length. Proving a
+  /// step as long as one wants valid is much cheaper than finding the longest one (at_most =
+  /// infinity).
   { e.max_step(x, p, at_most) } -> std::convertible_to<double>;
   /// Moves fixed unknowns on towards where they are prescribed to be, as far as is valid; true if x
   /// changed, after which gradient and energy must be evaluated anew. False once all have arrived.
@@ -84,8 +86,8 @@ concept CertifyingObjective = Objective<E> &&
   /// p'Hp, and a length up to which the terms that can tell are valid at x + t p, for t of either
   /// sign; infinity if there are none.
   { e.quadratic_form(x, p, certified) } -> std::convertible_to<double>;
-  /// max_step at the x and p for which quadratic_form has said `certified`: up to that length, only
-  /// the other terms are asked.
+  /// max_step at the x and p for which quadratic_form has said `certified`, which spares the terms
+  /// that can tell a search where it is enough.
   { e.max_step(x, p, at_most, certified) } -> std::convertible_to<double>;
 };
 

@@ -430,7 +430,7 @@ public:
     if (distance == 0) return false;
     // Materials that tolerate inversion may have to fold (a push faster than sound): there the
     // motion is not held up for ever.
-    constexpr double stride = 0.2;
+    constexpr double stride = 0.4;
     double const allowed = stride * max_advance(x, direction_, max_step(x, direction_, 1 / stride));
     double const patience = distance < 1e-3 * unknowns_.length ? 1.0 : 0.125;
     double const unfolded = stride * max_prescribed_step(x, direction_, 1 / stride);

@@ -64,7 +64,8 @@ concept SweptTerm = requires(
   { term.quadratic_form(x, p, scale) } -> std::convertible_to<double>;
   {term.add_product(x, p, scale, fixed, p)};
   {term.add_to(matrix, x, scale, fixed)};
-  /// Largest valid step along p up to `at_most`, which may be infinity.
+  /// How far one may go along p, up to `at_most`, which may be infinity: all of the way is valid,
+  /// and the term keeps what margin it needs.
   { term.max_step(x, p, at_most) } -> std::convertible_to<double>;
   /// The same as seen by prescribed motion, which may never fold the mesh (whatever the material).
   { term.max_prescribed_step(x, p, at_most) } -> std::convertible_to<double>;

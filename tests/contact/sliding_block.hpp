@@ -21,7 +21,7 @@ struct SlidingBlock {
   static constexpr double g = 9.81, density = 1000, dhat = 0.03;
   static constexpr double side = 0.4, height = 0.1, weight = density * side * side * height;
   using Elasticity = ElasticTets<Elastic<StableNeoHookean>, Fp64>;
-  using Touch = Contact<PairEnergy<>, SpatialHash<DefaultSpace>, AdditiveCcd, GivenStiffness, Fp64>;
+  using Touch = Contact<PairEnergy<>, Bvh<DefaultSpace>, AdditiveCcd, GivenStiffness, Fp64>;
   using Terms = Potential<Inertia<Fp64>, BodyForce<Fp64>, Elasticity, Touch, Friction<Fp64>>;
   using Stepper =
       ImplicitEuler<Ncg<DaiKou, BlockJacobi, SufficientDecrease, DecrementWindow, Fp64>>;

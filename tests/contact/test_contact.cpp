@@ -3,7 +3,7 @@
 #include "contact_scenes.hpp"
 
 #include <support/threads.hpp>
-#include <taut/contact/bvh.hpp>
+#include <taut/contact/spatial_hash.hpp>
 #include <taut/core/potential/any_terms.hpp>
 #include <taut/core/potential/potential.hpp>
 #include <taut/core/sparse/operations.hpp>
@@ -28,12 +28,12 @@ using Left = Space<Kokkos::DefaultHostExecutionSpace, Kokkos::LayoutLeft>;
 constexpr double infinity = std::numeric_limits<double>::infinity();
 constexpr double pressure = 1e4;
 
-template <class Precision, class S = DefaultSpace, class Search = SpatialHash<S>,
+template <class Precision, class S = DefaultSpace, class Search = Bvh<S>,
           class Rule = GivenStiffness>
 using ContactIn = Contact<PairEnergy<>, Search, AdditiveCcd, Rule, Precision, S>;
 
 /// The squashed cubes with a contact term over them.
-template <class Precision, class S = DefaultSpace, class Search = SpatialHash<S>>
+template <class Precision, class S = DefaultSpace, class Search = Bvh<S>>
 struct Fixture {
   using Term = ContactIn<Precision, S, Search>;
   using Real = typename Precision::real;
@@ -95,7 +95,7 @@ void move(Field const& x, std::vector<Point> const& from, std::vector<Point> con
 }
 
 /// All that the term computes, bit by bit.
-template <class Precision, class S, class Search = SpatialHash<S>>
+template <class Precision, class S, class Search = Bvh<S>>
 std::vector<double> everything() {
   Fixture<Precision, S, Search> f;
   std::vector<double> all{f.contact.value(f.x, 0.5), f.contact.change(f.x, f.p, 1e-3, 0.5),
@@ -243,7 +243,7 @@ TEMPLATE_TEST_CASE("contact is bitwise the same on any number of threads and in 
   auto const results =
       test::on_one_thread_and_all([] { return everything<TestType, DefaultSpace>(); });
   CHECK(results[0] == results[1]);
-  CHECK(results[0] == everything<TestType, DefaultSpace, Bvh<DefaultSpace>>());
+  CHECK(results[0] == everything<TestType, DefaultSpace, SpatialHash<DefaultSpace>>());
   CHECK(results[0] == everything<TestType, Left>());
 }
 
@@ -345,7 +345,7 @@ TEMPLATE_TEST_CASE("no step that is allowed crosses or uses up the gap", "[conta
     bool kept = true;
     soups::all_pairs(f.scene.surface, [&](soups::Pair const& other) {
       kept = kept && soups::distance(other, after) >=
-                         (0.1 - 1e-5) * std::min(soups::distance(other, positions), Squashed::dhat);
+                         (0.5 - 1e-5) * std::min(soups::distance(other, positions), Squashed::dhat);
     });
     CHECK(kept);
     move(f.x, positions, p, 0);
@@ -367,9 +367,13 @@ TEST_CASE("a step of any length is proved in portions", "[contact]") {
   auto const x = soups::to_field<double, DefaultSpace>(far);
   auto const p = soups::to_field<double, DefaultSpace>(down);
   double const alpha = f.contact.max_step(x, p, infinity);
-  // Nine tenths of a gap of 100 m and a little.
-  CHECK(alpha > 88);
-  CHECK(alpha < 91);
+  // A gap of 100 m and a little, but for what is left of dhat.
+  CHECK(alpha > 99);
+  CHECK(alpha < 101);
+  move(f.x, far, down, alpha);
+  auto const landed = f.contact.report(f.x);
+  CHECK(landed.smallest_gap > 0.5);
+  CHECK(landed.smallest_gap < 0.6);
   CHECK(f.contact.max_step(x, p, 10.0) == 10.0);
   CHECK_FALSE(f.contact.limiting_pair().has_value());
   double const free = f.contact.max_step(x, soups::to_field<double, DefaultSpace>(aside), infinity);
@@ -407,7 +411,7 @@ TEST_CASE("what touches allows no step, and is named", "[contact]") {
 TEST_CASE("stiffness may follow what the vertices resist with", "[contact]") {
   Squashed s;
   Unknowns<Fp64> const unknowns(std::vector<double>(s.x.size(), 1), 0.5);
-  ContactIn<Fp64, DefaultSpace, SpatialHash<>, ElasticInclusiveStiffness> contact(
+  ContactIn<Fp64, DefaultSpace, Bvh<>, ElasticInclusiveStiffness> contact(
       unknowns, s.surface, s.rest, {.dhat = Squashed::dhat});
   auto const x = soups::to_field<double, DefaultSpace>(s.x);
   CHECK_THROWS_WITH(contact.value(x, 1), ContainsSubstring("call begin_step"));

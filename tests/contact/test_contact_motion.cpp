@@ -98,7 +98,7 @@ double furthest_of_pins(FallingBox const& scene, State<> const& state) {
   return r;
 }
 
-using GivenContact = Contact<PairEnergy<>, SpatialHash<>, AdditiveCcd, GivenStiffness>;
+using GivenContact = Contact<PairEnergy<>, Bvh<>, AdditiveCcd, GivenStiffness>;
 using Falling = ImplicitEuler<Ncg<DaiKou, BlockJacobi>>;
 
 }  // namespace
@@ -243,7 +243,7 @@ TEST_CASE("one contact rests where K b' balances the load, whatever the time ste
 
   double const h = GENERATE(0.01, 0.0025);
   CAPTURE(h);
-  using Term = Contact<PairEnergy<>, SpatialHash<>, AdditiveCcd, GivenStiffness, Fp64>;
+  using Term = Contact<PairEnergy<>, Bvh<>, AdditiveCcd, GivenStiffness, Fp64>;
   Term const contact(unknowns, surface, rest, {.dhat = dhat, .stiffness = {.pressure = pressure}});
   Potential potential(unknowns, Inertia(unknowns), BodyForce(unknowns, {0, -gravity, 0}), contact);
   ImplicitEuler<Ncg<DaiKou, BlockJacobi, SufficientDecrease, DecrementWindow, Fp64>> stepper(

@@ -29,7 +29,7 @@ constexpr double pressure = 1e4, time_step = 0.01, stick_speed = 0.1;
 constexpr double length = stick_speed * time_step;  // e, m
 
 template <class Precision, class S = DefaultSpace>
-using TouchIn = Contact<PairEnergy<>, SpatialHash<S>, AdditiveCcd, GivenStiffness, Precision, S>;
+using TouchIn = Contact<PairEnergy<>, Bvh<S>, AdditiveCcd, GivenStiffness, Precision, S>;
 
 template <class Field>
 void fill(Field const& x, std::vector<Point> const& from, std::vector<Point> const& p, double by) {

@@ -41,7 +41,7 @@ TEST_CASE("all betas find the minimum, with all preconditioners") {
     energy += iteration.energy_change;
     CHECK(energy == iteration.energy_change_so_far);
   });
-  CHECK(report.stop == Stop::converged_by_decrement);
+  CHECK(report.converged());
   CHECK(report.energy_change == energy);
   CHECK_THAT(energy, WithinRel(chain.value(x) - before, 1e-10));
   CHECK(report.error_estimate_m < 1e-5 * chain.scale().length);

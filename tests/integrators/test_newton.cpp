@@ -25,7 +25,7 @@ TEST_CASE("the reported error is the true one") {
     for (int i = 0; i < chain.size(); ++i)
       for (int c = 0; c < 3; ++c) square += mass(i) * std::pow(x(i, c) - minimum(i, c), 2);
     double const error = std::sqrt(square / chain.scale().mass);
-    CHECK(report.stop == Stop::converged_by_decrement);
+    CHECK(report.converged());
     CHECK(report.error_estimate_m <= tolerance * chain.scale().length);
     CHECK(error <= report.error_estimate_m);
   }

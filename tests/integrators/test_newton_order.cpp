@@ -68,7 +68,7 @@ TEMPLATE_TEST_CASE("Newton minimises a quadratic in one step", "", Exact, Assemb
     ++steps;
     CHECK(step.length == 1);
   });
-  CHECK(report.stop == Stop::converged_by_decrement);
+  CHECK(report.converged());
   CHECK(report.iterations == 2);  // one to arrive, one to see it
   CHECK(steps == 2);
   CHECK(report.error_estimate_m < 1e-10);

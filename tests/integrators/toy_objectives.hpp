@@ -379,7 +379,11 @@ public:
                 ChainAssemble<Data, BlockCsr<S, double>>{data_, x, matrix});
   }
 
+  /// Half of the way to where a bond breaks.
   double max_step(Positions const& x, Field const& p, double at_most) const {
+    return 0.5 * longest_step(x, p, 2 * at_most);
+  }
+  double longest_step(Positions const& x, Field const& p, double at_most = infinity) const {
     return minimum<S>("chain_max_step", size() - 1, at_most, ChainMaxStep<Data>{data_, x, p});
   }
   bool advance_prescribed(Positions const& x) {

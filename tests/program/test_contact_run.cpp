@@ -75,7 +75,7 @@ TEST_CASE("every policy of contact runs by its name", "[contact]") {
                std::vector<std::string>{"contact.curvature=truncated"},
                std::vector<std::string>{"contact.curvature=exact"},
                std::vector<std::string>{"contact.mollifier=false"},
-               std::vector<std::string>{"contact.search=bvh"},
+               std::vector<std::string>{"contact.search=spatial_hash"},
                std::vector<std::string>{"contact.search=brute_force"},
                std::vector<std::string>{"contact.bound=closing"},
                std::vector<std::string>{"contact.stiffness=given", "contact.pressure=1e5"},
@@ -103,10 +103,10 @@ TEST_CASE("the paper's clamp is run as it is, and blamed for what it lets throug
 
 TEST_CASE("policies that are not compiled together are refused by name", "[contact]") {
   SECTION("two at a time") {
-    ContactRun run(bounce, {"contact.barrier=ipc", "contact.search=bvh"});
+    ContactRun run(bounce, {"contact.barrier=ipc", "contact.search=spatial_hash"});
     CHECK_THROWS_MATCHES(run_command(run.options), Error,
                          MessageMatches(ContainsSubstring(
-                             "barrier = \"ipc\" and search = \"bvh\" are not compiled together")));
+                             "barrier = \"ipc\" and search = \"spatial_hash\" are not compiled together")));
   }
   SECTION("in another precision") {
     ContactRun run(bounce, {"contact.barrier=ipc", "solver.precision=mixed"});
