@@ -9,6 +9,7 @@
 // No step may be longer than max_step says: then nothing crosses that had not crossed before.
 #pragma once
 
+#include <taut/contact/adaptive_stiffness.hpp>
 #include <taut/contact/bvh.hpp>
 #include <taut/contact/candidate_cache.hpp>
 #include <taut/contact/contact_pairs.hpp>
@@ -166,7 +167,17 @@ public:
   }
 
   /// Takes over the stiffness per vertex, for rules that need it; forgets all candidates.
-  void begin_step(StepStart<Precision, Space> const& start) const { state_->begin_step(start); }
+  void begin_step(StepStart<Precision, Space> const& start) const {
+    state_->begin_step(start);
+    if constexpr (AdaptiveRule<Stiffness_>) {
+      auto& table = state_->table;
+      if (!table.rule().adapts()) return;
+      table.change_rule([](Stiffness_& rule) { rule.reset(); });
+      StiffnessBalance const balance =
+          balance_of<typename Pair::Barrier>(*this, start, state_->fixed, state_->size);
+      table.change_rule([&](Stiffness_& rule) { rule.adapt(balance); });
+    }
+  }
   /// Grows with each search; x brings the candidates up to date.
   std::int64_t pattern_version(Positions const& x) const {
     state_->complete(x);
@@ -210,6 +221,7 @@ private:
     Cache near;            ///< for energies, and for bounds of short motions
     Cache swept;           ///< for bounds of others
     double brief;          ///< motion up to which they are short, m
+    double size;           ///< the diagonal of the box around the surface at rest, m
     double swept_for = 0;  ///< motion of its last search, m
     Table table;
     double limit = 0;
@@ -232,6 +244,7 @@ private:
       }
       surface = copy_surface<Space>(host);
       portion = edges.mean;
+      size = box_diagonal(host, rest);
       activation = {params.dhat.value_or(default_dhat(host, rest)), params.cap,
                     copy_points<Space>("contact_rest", rest), surface.object};
       clearance.ample = std::min(clearance.ample, activation.dhat);

@@ -82,6 +82,14 @@ public:
     taken_ = 0;
   }
 
+  /// Changes the rule; the K of pairs that are known are found anew.
+  template <class Change>
+  void change_rule(Change const& change) {
+    change(rule_);
+    taken_ = 0;
+  }
+  Rule const& rule() const { return rule_; }
+
   /// Takes over what a cache found, unless it has already, and how far that has moved since.
   template <class Cache>
   void take(Cache const& cache) {

@@ -14,6 +14,7 @@
 // turn. An obstacle that does not move has no sweep of its own in any of this.
 #pragma once
 
+#include <taut/contact/adaptive_stiffness.hpp>
 #include <taut/contact/lag_obstacle.hpp>
 #include <taut/contact/obstacle_kernels.hpp>
 
@@ -176,6 +177,12 @@ public:
     state_->enter(start.x);
     FaceMotion const& motion = state_->track.motion();
     state_->carry = {turn_matrix(motion.turn), motion.along, state_->table.faces.origin};
+    if constexpr (AdaptiveRule<Stiffness_>) {
+      Stiffness_& rule = state_->table.rule;
+      if (!rule.adapts()) return;
+      rule.reset();
+      rule.adapt(balance_of<Barrier>(*this, start, state_->table.fields.fixed, state_->size));
+    }
   }
 
   /// For friction: appends what acts at x; the coefficient of object k of the surface is mu(k, k).
@@ -239,6 +246,7 @@ private:
     typename SurfaceViews<Space>::Indices object;  ///< per vertex of the mesh
     bool anew = true;  ///< nothing is known yet of what the obstacle holds
     std::optional<LimitingVertex> limiting;
+    double size;  ///< the diagonal of the box around the surface at rest, m
     Reducer<Space, double> reducer;
 
     State(Unknowns<Precision, Space> const& unknowns, Surface const& host,
@@ -258,6 +266,7 @@ private:
       double const dhat = params.dhat.value_or(default_dhat(host, rest));
       check(params, dhat);
       clearance.ample = std::min(clearance.ample, dhat);
+      size = box_diagonal(host, rest);
       table.vertex = to_space<Space>("obstacle_vertex", host.vertices);
       object = to_space<Space>("obstacle_object", host.object);
       table.held = Fixed("obstacle_held", host.vertices.size());

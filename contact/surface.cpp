@@ -164,4 +164,17 @@ double default_dhat(Surface const& surface, std::span<Point const> points) {
   return 0.3 * shortest;
 }
 
+double box_diagonal(Surface const& surface, std::span<Point const> points) {
+  double square = 0;
+  for (int c = 0; c < 3; ++c) {
+    double low = INFINITY, high = -INFINITY;
+    for (std::int32_t v : surface.vertices) {
+      low = std::min(low, points[v][c]);
+      high = std::max(high, points[v][c]);
+    }
+    if (high > low) square += (high - low) * (high - low);
+  }
+  return std::sqrt(square);
+}
+
 }  // namespace taut

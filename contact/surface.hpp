@@ -44,6 +44,9 @@ struct EdgeLengths {
 /// Of the edges of `surface` with its vertices at `points`, m.
 EdgeLengths edge_lengths(Surface const& surface, std::span<Point const> points);
 
+/// Of the box around the vertices of `surface`, m.
+double box_diagonal(Surface const& surface, std::span<Point const> points);
+
 /// From what distance on contact acts if nothing is said, m: 0.3 of the mean edge of the body whose
 /// edges are shortest, so that nothing small is held off further than it is large.
 double default_dhat(Surface const& surface, std::span<Point const> points);

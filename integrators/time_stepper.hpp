@@ -206,11 +206,11 @@ private:
     }
     auto& inertia = potential.template term<Inertia<Precision, Space>>();
     inertia.switch_on(R::inertia);
-    potential.begin_step(state.x, r.scale * (R::inertia ? h * h : 1.0), h * std::sqrt(r.scale),
-                         R::inertia);
     for_each<Space>("inertial_target", n,
                     kernels::InertialTarget<Precision, Space>{state, inertia.target(), x_, r.a0,
                                                               r.a1, h * r.b0, h * r.b1});
+    potential.begin_step(state.x, r.scale * (R::inertia ? h * h : 1.0), h * std::sqrt(r.scale),
+                         R::inertia);
     potential.predict(x_);
     start(potential, state);
     auto report = minimiser_.minimise(potential, x_, observer);

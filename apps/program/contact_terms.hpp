@@ -3,6 +3,7 @@
 #pragma once
 
 #include <taut/apps/program/scene_options.hpp>
+#include <taut/contact/adaptive_stiffness.hpp>
 #include <taut/contact/contact.hpp>
 #include <taut/contact/friction.hpp>
 #include <taut/core/potential/any_terms.hpp>
@@ -43,25 +44,41 @@ std::shared_ptr<ProgramContact<P> const> add_contact_term(AnySteppedTerms<P>& te
 struct AnyStiffness {
   static constexpr char const* name = "any";
   static constexpr bool per_vertex = true;
-  bool given = false;
-  GivenStiffness by_pressure = {};
+  enum class Kind { inclusive, given, adaptive };
+  Kind kind = Kind::inclusive;
   ElasticInclusiveStiffness inclusive = {};
+  GivenStiffness by_pressure = {};
+  IpcAdaptiveStiffness adaptive = {};
 
   explicit AnyStiffness(ContactOptions const& options)
-      : given(options.text("stiffness") == "given"),
-        by_pressure{options.number("pressure")},
-        inclusive{options.number("stiffness_factor")} {}
+      : inclusive{options.number("stiffness_factor")}, by_pressure{options.number("pressure")} {
+    std::string const rule = options.text("stiffness");
+    if (rule == GivenStiffness::name) kind = Kind::given;
+    if (rule == IpcAdaptiveStiffness::name) kind = Kind::adaptive;
+  }
   AnyStiffness() = default;
 
-  bool valid() const { return given ? by_pressure.valid() : inclusive.valid(); }
+  bool valid() const {
+    return kind == Kind::given      ? by_pressure.valid()
+           : kind == Kind::adaptive ? adaptive.valid()
+                                    : inclusive.valid();
+  }
   template <class Fields>
-  KOKKOS_FUNCTION double operator()(Fields const& fields, PairKind kind, int const (&v)[4]) const {
-    return given ? by_pressure(fields, kind, v) : inclusive(fields, kind, v);
+  KOKKOS_FUNCTION double operator()(Fields const& fields, PairKind pair, int const (&v)[4]) const {
+    return kind == Kind::given      ? by_pressure(fields, pair, v)
+           : kind == Kind::adaptive ? adaptive(fields, pair, v)
+                                    : inclusive(fields, pair, v);
   }
   template <class Fields>
   KOKKOS_FUNCTION double vertex(Fields const& fields, int v) const {
-    return given ? by_pressure.vertex(fields, v) : inclusive.vertex(fields, v);
+    return kind == Kind::given      ? by_pressure.vertex(fields, v)
+           : kind == Kind::adaptive ? adaptive.vertex(fields, v)
+                                    : inclusive.vertex(fields, v);
   }
+
+  bool adapts() const { return kind == Kind::adaptive; }
+  void reset() { adaptive.reset(); }
+  void adapt(StiffnessBalance const& balance) { adaptive.adapt(balance); }
 };
 
 }  // namespace taut

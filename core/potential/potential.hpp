@@ -275,7 +275,7 @@ public:
 
   /// The time integrator says what the step is: where it starts, the factor of all energies but the
   /// inertia (h^2 for implicit Euler), and the step that turns errors of position into errors of
-  /// velocity.
+  /// velocity. The target of the inertia is that of this step already.
   void begin_step(Positions const& x, double scale, double time_step, bool has_inertia) {
     scale_ = scale;
     kernels::FreeMass<Space, Precision> const free_mass{unknowns_.fixed, unknowns_.mass};
@@ -285,7 +285,9 @@ public:
       bool anyone = false;
       for_each_of<is_stepped>([&](auto const& term) { anyone = anyone || !holds_nothing(term); });
       if (!anyone) return;
-      StepStart<Precision, Space> const start{x, time_step, stiffness_of_untold(x)};
+      auto const stiffness = stiffness_of_untold(x);  // and their gradient, in direction_
+      StepStart<Precision, Space> const start{x,          time_step, stiffness,
+                                              direction_, scale_,    mass / size()};
       for_each_of<is_stepped>([&](auto const& term) { term.begin_step(start); });
     }
   }

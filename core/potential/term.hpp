@@ -84,6 +84,11 @@ struct StepStart {
   /// What resists a motion of each unknown, N/m: a third of the trace of its block in the Hessian
   /// of all terms that are not told (with inertia, m / h^2 and what is elastic), at x.
   Array<typename Precision::real, S> stiffness;
+  /// The gradient, at x, of all terms that are not told, times `scale`: of the energy in J as
+  /// gradients of a potential are of theirs. Zero where fixed. Lasts while the step begins.
+  VectorField<typename Precision::real, S> gradient = {};
+  double scale = 0;      ///< h^2, or 1 where there is no inertia
+  double mean_mass = 0;  ///< of an unknown, kg
 };
 
 /// A term that is told when a step begins. It may then become another function of x, and must not

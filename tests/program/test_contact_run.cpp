@@ -79,6 +79,7 @@ TEST_CASE("every policy of contact runs by its name", "[contact]") {
                std::vector<std::string>{"contact.search=brute_force"},
                std::vector<std::string>{"contact.bound=closing"},
                std::vector<std::string>{"contact.stiffness=given", "contact.pressure=1e5"},
+               std::vector<std::string>{"contact.stiffness=ipc_adaptive"},
                std::vector<std::string>{"solver.method=newton"},
                std::vector<std::string>{"solver.method=newton", "solver.hessian=matrix_free"},
                std::vector<std::string>{"solver.method=newton", "solver.hessian=direct"},
