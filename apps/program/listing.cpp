@@ -1,4 +1,5 @@
 // The commands that say what there is: scenes, methods, and the plan of a scene.
+#include <taut/apps/program/choose_preconditioner.hpp>
 #include <taut/apps/program/commands.hpp>
 #include <taut/apps/program/memory.hpp>
 #include <taut/apps/program/methods.hpp>
@@ -169,12 +170,11 @@ int plan_command(SceneArguments const& arguments) {
     fmt::print("  (no body force: no gravity, no [[force]])\n");
   }
   std::set<std::string> models;
-  double stiffest = 0, softest = 1e300, fastest_wave = 0;
+  double stiffest = 0, softest = 1e300;
   for (MaterialParameters const& m : geometry.materials) {
     models.insert(m.model);
     stiffest = std::max(stiffest, m.young);
     softest = std::min(softest, m.young);
-    fastest_wave = std::max(fastest_wave, std::sqrt(m.young / m.density));
   }
   for (std::string const& model : models) {
     bool const inverts =
@@ -203,9 +203,10 @@ int plan_command(SceneArguments const& arguments) {
     fmt::print("  linear solve  {}, to {:.3g} of the residual at most\n", solver.text("hessian"),
                solver.number("linear_tolerance"));
   }
-  std::string const& metric = solver.text("preconditioner");
-  fmt::print("  metric        evens out stiffness and mass: {}{}\n", metric,
-             metric == "identity" ? "" : ", refreshed " + solver.text("refresh"));
+  PreconditionerChoice const metric = choose_preconditioner(scene, geometry);
+  fmt::print("  metric        evens out stiffness and mass: {} ({}){}\n", metric.name,
+             metric.reason,
+             metric.name == "identity" ? "" : ", refreshed " + solver.text("refresh"));
   fmt::print("  curvature     keeps the metric positive where elements buckle: {}\n",
              solver.text("curvature"));
   fmt::print("  line search   says how far to go: {}\n", solver.text("line_search"));
@@ -217,11 +218,10 @@ int plan_command(SceneArguments const& arguments) {
              stop_of(solver, edge, h, quasi_static), solver.integer("max_iterations"));
   fmt::print("advice\n");
   if (!quasi_static) {
-    // How many elements a wave crosses per step says how global a step is.
-    double const courant = fastest_wave * h / edge;
+    double const courant = elements_per_step(scene, geometry);
     fmt::print("  the fastest wave crosses {:.2g} elements per step{}\n", courant,
                courant < 1 ? ": an explicit method would do" : "");
-    if (courant > 30 && solver.text("preconditioner") == "block_jacobi") {
+    if (courant > 30 && metric.name == "block_jacobi") {
       fmt::print(
           "  that is stiff: measure `taut chart {} --methods "
           "dk,dk:preconditioner=schwarz_32,newton`\n",

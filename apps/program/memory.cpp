@@ -192,10 +192,12 @@ double memory_needed(MeshSize const& size, SolverOptions const& solver) {
   double bytes = 2.5e7 + tets * (14 * real + 60 + 130) + vertices * (30 * real + 400);
   bool const assembles =
       solver.text("method") == "newton" && solver.text("hessian") != "matrix_free";
-  bool const schwarz = solver.text("preconditioner").starts_with("schwarz");
+  // Where it is still to be chosen, the larger one.
+  std::string const& preconditioner = solver.text("preconditioner");
+  bool const schwarz = preconditioner.starts_with("schwarz") || preconditioner == "auto";
   if (assembles || schwarz) bytes += vertices * 15 * (72 + 4);  // ~15 blocks per row
   if (schwarz) {
-    double const width = solver.text("preconditioner") == "schwarz_16" ? 16 : 32;
+    double const width = preconditioner == "schwarz_16" ? 16 : 32;
     bytes += vertices * 9 * width * real;
   }
   if (assembles && solver.text("hessian") == "direct") bytes += vertices * 15 * 72 * 20;  // fill-in

@@ -109,7 +109,7 @@ private:
     std::string const& name = options_.text("preconditioner");
     if (name == "identity") return typename Identity<P, Space>::Params{};
     if (name == "jacobi") return typename Jacobi<P, Space>::Params{.refresh = refresh("always")};
-    if (name == "block_jacobi") {
+    if (name == "block_jacobi" || name == "auto") {  // where there is no scene to choose for
       return typename BlockJacobi<P, Space>::Params{.refresh = refresh("always")};
     }
     typename Schwarz<P, Space>::Params schwarz;

@@ -1,4 +1,5 @@
 // `taut run`: steps a scene and writes its result, report and checkpoints.
+#include <taut/apps/program/choose_preconditioner.hpp>
 #include <taut/apps/program/commands.hpp>
 #include <taut/apps/program/intersections.hpp>
 #include <taut/apps/program/memory.hpp>
@@ -318,12 +319,14 @@ private:
   void summarise(std::string const& how) {
     Record summary;
     if (scene_.contact) set_contact(summary);
+    PreconditionerChoice const preconditioner = choose_preconditioner(scene_, geometry_);
     summary.set("scene", scene_.name)
         .set("ended", how)
         .set("vertices", geometry_.mesh.points.size())
         .set("tets", geometry_.mesh.tets.size())
         .set("method", scene_.solver.text("method"))
-        .set("preconditioner", scene_.solver.text("preconditioner"))
+        .set("preconditioner", preconditioner.name)
+        .set("preconditioner_because", preconditioner.reason)
         .set("precision", scene_.solver.text("precision"))
         .set("frames", simulation_->steps())
         .set("frames_asked", scene_.frames)

@@ -18,10 +18,12 @@ std::span<OptionKey const> solver_keys() {
        {"fp64", "mixed", "fp32"},
        "mixed: fp32 kernels with fp64 positions and sums"},
       {"preconditioner",
-       std::string("block_jacobi"),
+       std::string("auto"),
        {},
-       {"identity", "jacobi", "block_jacobi", "schwarz_16", "schwarz_32"},
-       "schwarz: dense aggregates of 16 or 32 vertices with a coarse level"},
+       {"auto", "identity", "jacobi", "block_jacobi", "schwarz_16", "schwarz_32"},
+       "schwarz: dense aggregates of 16 or 32 vertices with a coarse level; auto: schwarz_32 where "
+       "a "
+       "step reaches over several elements, otherwise block_jacobi (`taut plan` says why)"},
       {"refresh",
        std::string("auto"),
        {},
@@ -99,8 +101,9 @@ std::span<OptionKey const> contact_keys() {
       {"stiffness",
        std::string("elastic_inclusive"),
        {},
-       {"elastic_inclusive", "given"},
-       "of a pair: what its vertices resist with in this step; or `pressure` times area over dhat"},
+       {"elastic_inclusive", "given", "ipc_adaptive"},
+       "of a pair: what its vertices resist with in this step; `pressure` times area over dhat; or "
+       "IPC's, one for all pairs"},
       {"pressure",
        0.0,
        {.min = 0, .max = 1e15, .unit = "Pa"},

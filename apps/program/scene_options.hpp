@@ -33,6 +33,8 @@ public:
   int integer(std::string_view key) const { return get<int>(key); }
   double number(std::string_view key) const { return get<double>(key); }
   std::string const& text(std::string_view key) const { return get<std::string>(key); }
+  /// For a key of text that exists.
+  void set(std::string_view key, std::string const& text) { values_.find(key)->second = text; }
 
 private:
   template <class T>

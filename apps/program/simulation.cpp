@@ -1,3 +1,4 @@
+#include <taut/apps/program/choose_preconditioner.hpp>
 #include <taut/apps/program/methods.hpp>
 #include <taut/apps/program/obstacle_terms.hpp>
 #include <taut/apps/program/simulation.hpp>
@@ -45,7 +46,7 @@ public:
   using Vectors = VectorField<typename P::real, DefaultSpace>;
 
   SimulationOf(Scene const& scene, SceneGeometry const& geometry)
-      : scene_(scene),
+      : scene_(with_chosen_preconditioner(scene, geometry)),
         geometry_(geometry),
         mesh_(with_obstacles(geometry)),
         order_(locality_order(mesh_, geometry.material_of_tet)),
@@ -55,9 +56,9 @@ public:
         forces_("forces", size()),
         fixed_(Kokkos::create_mirror_view(potential_.unknowns().fixed)),
         prescribed_(Kokkos::create_mirror_view(potential_.unknowns().prescribed)),
-        euler_(scene.solver, lagging()),
-        bdf2_(scene.solver, lagging()),
-        static_(scene.solver, lagging()) {
+        euler_(scene_.solver, lagging()),
+        bdf2_(scene_.solver, lagging()),
+        static_(scene_.solver, lagging()) {
     write(state_.x, geometry.start, mesh_.points);
     write(state_.v, geometry.velocity, std::vector<Point>(size()));
     refuse_forbidden_inversion();
