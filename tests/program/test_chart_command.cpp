@@ -161,6 +161,7 @@ TEST_CASE("a sweep says what it took, or that it failed", "[chart]") {
   ChartOptions options = options_for(folder, test::plain_scene + sweep);
   options.sweep = true;
   options.methods = {"dk", "newton", "gradient"};
+  options.scene.changes.overrides.push_back("solver.preconditioner=block_jacobi");
   options.max_iterations = 60;
   Data const data = chart(options);
   CHECK_THAT(data.header, ContainsSubstring("# kind = sweep\n"));

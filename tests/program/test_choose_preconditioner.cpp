@@ -16,7 +16,7 @@ using Catch::Matchers::WithinRel;
 namespace {
 
 PreconditionerChoice choice(std::string const& name, std::vector<std::string> const& overrides) {
-  Scene const scene = load_scene(find_scene(name), {true, overrides});
+  Scene const scene = load_scene(scene_folder() / (name + ".toml"), {true, overrides});
   return choose_preconditioner(scene, build_geometry(scene));
 }
 
@@ -42,7 +42,7 @@ TEST_CASE("a preconditioner that is asked for is taken", "[options]") {
 
 TEST_CASE("elements per step go with the root of the modulus, and with the step", "[options]") {
   auto const reach = [](std::vector<std::string> const& overrides) {
-    Scene const scene = load_scene(find_scene("stiffness_sweep"), {true, overrides});
+    Scene const scene = load_scene(scene_folder() / "stiffness_sweep.toml", {true, overrides});
     return elements_per_step(scene, build_geometry(scene));
   };
   double const one = reach({"object.body.material.young=1e4", "time.step=0.01"});

@@ -105,9 +105,10 @@ TEST_CASE("the paper's clamp is run as it is, and blamed for what it lets throug
 TEST_CASE("policies that are not compiled together are refused by name", "[contact]") {
   SECTION("two at a time") {
     ContactRun run(bounce, {"contact.barrier=ipc", "contact.search=spatial_hash"});
-    CHECK_THROWS_MATCHES(run_command(run.options), Error,
-                         MessageMatches(ContainsSubstring(
-                             "barrier = \"ipc\" and search = \"spatial_hash\" are not compiled together")));
+    CHECK_THROWS_MATCHES(
+        run_command(run.options), Error,
+        MessageMatches(ContainsSubstring(
+            "barrier = \"ipc\" and search = \"spatial_hash\" are not compiled together")));
   }
   SECTION("in another precision") {
     ContactRun run(bounce, {"contact.barrier=ipc", "solver.precision=mixed"});

@@ -45,7 +45,11 @@ TEST_CASE("Newton takes line search and window from the options", "[options]") {
   Outcome const plain = run("window=0");
   CHECK(run("line_search=exact").x != plain.x);
   CHECK(run("window=1").x == plain.x);
-  CHECK(run("window=6").report.iterations > plain.report.iterations);
+  // Without inertia, where the gradient proves nothing.
+  auto const at_rest = [](std::string const& key) {
+    return first_step("hanging_bar", {"method=newton", "hessian=direct", key}).report.iterations;
+  };
+  CHECK(at_rest("window=6") > at_rest("window=1"));
 }
 
 TEST_CASE("the gradient norm is relative to the first", "[options]") {
