@@ -1,5 +1,5 @@
 // Contact, with a barrier of one's own: a block falls onto another one that is held.
-#include <taut/contact/connected.hpp>
+#include <taut/core/fem/connected.hpp>
 #include <taut/contact/contact.hpp>
 #include <taut/core/fem/body.hpp>
 #include <taut/core/fem/elastic_tets.hpp>
