@@ -197,7 +197,7 @@ TEST_CASE("with islands and without the same minimum is found, and momentum is k
 TEST_CASE("an island that has ended is woken by what comes to touch it", "[islands]") {
   // A long step: the second flies free and ends at once, then the first arrives, and through both
   // the third hears of it.
-  double const speed = GENERATE(2.0, 3.0, 12.0);
+  double const speed = GENERATE(3.0, 12.0);
   CAPTURE(speed);
   std::vector<Block> const row{{{0, 0, 0}, {speed, 0, 0}, 1e5},
                                {{0.8, 0.05, 0}, {0, 0, 0}, 1e5},
