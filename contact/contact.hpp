@@ -12,6 +12,7 @@
 #include <taut/contact/adaptive_stiffness.hpp>
 #include <taut/contact/bvh.hpp>
 #include <taut/contact/candidate_cache.hpp>
+#include <taut/contact/contact_islands.hpp>
 #include <taut/contact/contact_pairs.hpp>
 #include <taut/contact/lag_pairs.hpp>
 #include <taut/contact/step_bound_sweep.hpp>
@@ -183,6 +184,23 @@ public:
     state_->complete(x);
     return state_->near.counters().searches;
   }
+
+  void add_form_shares(Positions const& x, Vectors const& p, double scale, Fixed const& fixed,
+                       Array<double, Space> const& shares) const {
+    if (!state_->complete(x)) return;
+    using Kernel = kernels::PairFormShares<Pair, Precision, Space>;
+    state_->table.template add_form_shares<Kernel>(x, p, scale, fixed, shares);
+  }
+  /// Joins the bodies of all candidates of the last search, whether they act or not.
+  bool link(Fixed const& fixed, typename Bodies<Space>::Indices const& body,
+            typename Bodies<Space>::Indices const& label) const {
+    if (state_->near.counters().searches == 0) return false;
+    state_->table.take(state_->near);
+    using Kernel = kernels::LinkPairs<Precision, Space>;
+    return maximum<Space>("contact_link", pairs().count, 0, Kernel{pairs(), fixed, body, label}) >
+           0;
+  }
+  void set_idle(IdleMask<Space> const& idle) const { state_->table.set_idle(idle); }
 
   /// For friction: appends all pairs that act at x, with mu by the objects of the surface.
   void lag(Positions const& x, kernels::FrictionMatrix<Space> const& mu,

@@ -25,13 +25,15 @@ struct PairTable {
   Array<Real, S> stiffness, activation, mollifier;
   Array<float, S> clearance;  ///< pair_length of the distance, where it was found, less activation
   Displacement moved;         ///< since
+  IdleMask<S> resting;        ///< vertices of idle islands, if there are any
   int point_triangles = 0, count = 0;
 
   /// Pair k certainly does not act: neither where the vertices are, nor at the other end of the
-  /// motion, if there is one.
+  /// motion, if there is one. Or both of its bodies are idle.
   KOKKOS_FUNCTION bool idle(int k) const {
     float const c = clearance(k);
-    return moved.of(c) < double(Kokkos::abs(c));
+    if (moved.of(c) < double(Kokkos::abs(c))) return true;
+    return resting.extent(0) > 0 && resting(vertex(k, 0)) && resting(vertex(k, 3));
   }
 
   KOKKOS_FUNCTION PairKind kind(int k) const {

@@ -70,6 +70,16 @@ public:
 
   kernels::PairTable<Precision, S> const& pairs() const { return pairs_; }
 
+  /// Leaves out pairs of idle vertices; nothing if the mask is empty.
+  void set_idle(IdleMask<S> const& idle) { pairs_.resting = idle; }
+  /// Adds p'Hp of each pair to one of its vertices (contact_islands.hpp).
+  template <class Shares>
+  void add_form_shares(Positions const& x, Vectors const& p, double scale,
+                       FixedMask<S> const& fixed, Array<double, S> const& shares) const {
+    for_each<S>("contact_shares", surface_.vertices(),
+                Shares{surface_.vertex, {begin_, slot_}, {pairs_, x, p}, fixed, scale, shares});
+  }
+
   void set_vertex_stiffness(Array<Real, S> const& stiffness) {
     if (stiffness.extent(0) != fields_.area.extent(0)) {
       throw Error("contact: a stiffness for {} vertices, but there are {}", stiffness.extent(0),

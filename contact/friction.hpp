@@ -22,6 +22,7 @@
 // A pair of meshes exerts no net force, but the moment of its tangential force over its gap.
 #pragma once
 
+#include <taut/contact/contact_islands.hpp>
 #include <taut/contact/friction_coefficients.hpp>
 #include <taut/contact/friction_kernels.hpp>
 
@@ -157,6 +158,22 @@ public:
   }
   /// Grows whenever contacts are lagged.
   std::int64_t pattern_version(Positions const&) const { return state_->version; }
+
+  void add_form_shares(Positions const& x, Vectors const& p, double scale, Fixed const& fixed,
+                       Array<double, Space> const& shares) const {
+    if (count() == 0) return;
+    using Kernel = kernels::FrictionShares<Precision, Space>;
+    auto const vertices = lagged().active_vertices();
+    for_each<Space>("friction_shares", vertices.extent_int(0),
+                    Kernel{vertices, lagged().slots(), {slips(), x, p}, fixed, scale, shares});
+  }
+  /// Joins the bodies of each contact.
+  bool link(Fixed const& fixed, typename Bodies<Space>::Indices const& body,
+            typename Bodies<Space>::Indices const& label) const {
+    using Kernel = kernels::LinkFriction<Precision, Space>;
+    return maximum<Space>("friction_link", count(), 0,
+                          Kernel{lagged().table(), fixed, body, label}) > 0;
+  }
 
   /// Friction forbids nothing.
   double max_step(Positions const&, Vectors const&, double at_most) const { return at_most; }

@@ -1,8 +1,8 @@
 #include <taut/contact/intersection.hpp>
 
 #include <taut/contact/box_tree.hpp>
-#include <taut/contact/connected.hpp>
 #include <taut/contact/winding_number.hpp>
+#include <taut/core/fem/connected.hpp>
 #include <taut/core/report/error.hpp>
 
 #include <algorithm>

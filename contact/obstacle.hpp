@@ -112,6 +112,13 @@ public:
     return scale * sum<1>("obstacle_form", Kernel{table(), x, p})[0];
   }
 
+  void add_form_shares(Positions const& x, Vectors const& p, double scale, Fixed const&,
+                       Array<double, Space> const& shares) const {
+    using Form = kernels::ObstacleForm<Barrier, Table>;
+    for_each<Space>("obstacle_shares", vertices(),
+                    kernels::ObstacleShares<Form, Space>{Form{table(), x, p}, scale, shares});
+  }
+
   void add_gradient(Positions const& x, double scale, Fixed const&, Vectors const& g) const {
     gradient<0>(x, scale, g, g);
   }

@@ -229,6 +229,15 @@ struct ObstacleForm {
   KOKKOS_FUNCTION void operator()(int i, Sums<double, 1>& sum) const { sum[0] += form(i); }
 };
 
+/// The share of each vertex (DivisibleTerm).
+template <class Form, class S>
+struct ObstacleShares {
+  Form of;
+  double scale;
+  Array<double, S> shares;
+  KOKKOS_FUNCTION void operator()(int i) const { shares(of.table.vertex(i)) += scale * of.form(i); }
+};
+
 template <class Barrier, class Table>
 struct ObstacleProduct {
   using Real = typename Table::Real;

@@ -72,6 +72,44 @@ struct Safeguard {
   double least_descent = 1e-3;  ///< p descends if g'p <= -least_descent times Heading::descent
 };
 
+/// Stalled if what remains is round-off, which the line search lets pass: over a window as long as
+/// everything before it (but not forever longer), steps did not lower the energy, or by less on
+/// average than its round-off and no faster than in the window before.
+class StallWatch {
+public:
+  void stepped(double energy_change) { recent_change_ += energy_change; }
+  Stop check(int iterations, double noise) {
+    if (iterations < window_end_) return Stop::none;
+    double const mean = -recent_change_ / (window_end_ - window_begin_);
+    bool const lost_in_noise = mean < noise && mean > 0.7 * last_mean_;
+    bool const stalled = mean <= 0 || lost_in_noise;
+    recent_change_ = 0;
+    last_mean_ = mean;
+    window_begin_ = std::exchange(window_end_, window_end_ + std::min(window_end_, longest_window));
+    return stalled ? Stop::stalled : Stop::none;
+  }
+
+private:
+  static constexpr int longest_window = 512;
+  int window_begin_ = 0, window_end_ = 32;                      ///< iterations
+  double recent_change_ = 0;                                    ///< of energy in this window
+  double last_mean_ = std::numeric_limits<double>::infinity();  ///< decrement of a step in the last
+};
+
+/// What round-off makes of the error, m: `positions`, that of the positions, and `edges`, that of
+/// the edges in which a gradient is computed; and where H is inverted by iterating with an
+/// approximation of it, that of the gradient, K times the latter, in the lowest modes, which take
+/// one share of the 3n in which it is spread. `stiffest` and `lowest`: curvature relative to the
+/// mass; the former 0 where H is inverted. The factor is measured (CG and L-BFGS in mixed precision
+/// on the bars and beams of stopping.hpp end at 0.14 to 2.4 times this).
+inline double round_off_floor(double positions, double edges, double stiffest, double lowest,
+                              int unknowns) {
+  constexpr double measured = 8;
+  double floor = positions + edges;
+  if (stiffest > 0) floor += measured * edges * stiffest / (lowest * std::sqrt(3.0 * unknowns));
+  return floor;
+}
+
 /// One minimisation: holds what the loop needs to know between its parts.
 template <class E, class M, class D, class Search, class Rule>
 requires Objective<E> && Preconditioner<M, E> && Direction<D, E, M> && LineSearch<Search, E> &&
@@ -194,7 +232,7 @@ private:
     bool const backtracked = step_.backtracks > 0;
     largest_decrement_ = std::max(largest_decrement_, decrement);
     report_.energy_change += step_.energy_change;
-    recent_change_ += step_.energy_change;
+    watch_.stepped(step_.energy_change);
     lost_energy_ += decrement;
     learn_curvature(line.known_curvature() / heading.metric, heading.solved);
     lowest_curvature_ = find_lowest_curvature();
@@ -215,22 +253,9 @@ private:
       ++report_.restarts.cut;
       direction_.restart();
     }
-    if (!advance_prescribed()) report_.stop = stop != Stop::none ? stop : check_progress();
-  }
-
-  /// Stalled if what remains is round-off, which the line search lets pass: over a window as long
-  /// as everything before it (but not forever longer), steps did not lower the energy, or by less
-  /// on average than its round-off and no faster than in the window before.
-  Stop check_progress() {
-    if (report_.iterations < window_end_) return Stop::none;
-    double const mean = -recent_change_ / (window_end_ - window_begin_);
+    if (advance_prescribed()) return;
     double const noise = 16 * epsilon<typename P::real> * largest_decrement_;
-    bool const lost_in_noise = mean < noise && mean > 0.7 * last_mean_;
-    bool const stalled = mean <= 0 || lost_in_noise;
-    recent_change_ = 0;
-    last_mean_ = mean;
-    window_begin_ = std::exchange(window_end_, window_end_ + std::min(window_end_, longest_window));
-    return stalled ? Stop::stalled : Stop::none;
+    report_.stop = stop != Stop::none ? stop : watch_.check(report_.iterations, noise);
   }
 
   /// No step along p was good enough. Along -P g that is the end, unless prescribed unknowns are
@@ -288,19 +313,9 @@ private:
         covered > 0 ? std::min(smallest_curvature_, covered) : smallest_curvature_;
     return std::isfinite(lowest) ? lowest : 0;
   }
-  /// What round-off makes of the error: that of the positions, that of the edges in which a
-  /// gradient is computed, and where H is inverted by iterating with an approximation of it, that
-  /// of the gradient, K times the latter, in the lowest modes, which take one share of the 3n in
-  /// which it is spread. The factor is measured (CG and L-BFGS in mixed precision on the bars and
-  /// beams of stopping.hpp end at 0.14 to 2.4 times this).
   double error_floor() const {
-    constexpr double measured = 8;
-    double const noise = epsilon<typename P::real> * scale_.length;
-    double floor = position_noise_ + noise;
-    if (stiffest_ > 0) {
-      floor += measured * noise * stiffest_ / (lowest_curvature_ * std::sqrt(3.0 * e_.size()));
-    }
-    return floor;
+    return round_off_floor(position_noise_, epsilon<typename P::real> * scale_.length, stiffest_,
+                           lowest_curvature_, e_.size());
   }
   double largest_position() const {
     using Largest = kernels::LargestNorm<VectorField<typename P::position, S>>;
@@ -328,11 +343,7 @@ private:
   double smallest_curvature_ = std::numeric_limits<double>::infinity(), stiffest_ = 0;
   double lowest_curvature_ = 1;
   double position_noise_ = 0;  ///< m
-  // check_progress():
-  static constexpr int longest_window = 512;
-  int window_begin_ = 0, window_end_ = 32;                      ///< iterations
-  double recent_change_ = 0;                                    ///< of energy in this window
-  double last_mean_ = std::numeric_limits<double>::infinity();  ///< decrement of a step in the last
+  StallWatch watch_;
   MinimiserReport report_;
 };
 
@@ -371,6 +382,12 @@ public:
       preconditioned_ = e.size();
       preconditioner_.resize(e.size());
       directions_.resize(e.size(), preconditioner_.pointwise());
+    }
+    if constexpr (requires { directions_.splits(e, preconditioner_, params_); }) {
+      if (directions_.splits(e, preconditioner_, params_)) {
+        return directions_.minimise_split(e, x, fields_, preconditioner_, line_search_, stopping_,
+                                          params_, observer);
+      }
     }
     return Descent(e, x, fields_, preconditioner_, directions_, line_search_, stopping_,
                    params_.budget, params_.safeguard, observer)

@@ -65,6 +65,8 @@ public:
     double const infinity = std::numeric_limits<double>::infinity();
     return slope_ > 0 ? -infinity : infinity;
   }
+  /// Whoever knows that x + a p is valid for all a below `length` may say so.
+  void know_valid(double length) { valid_ = length; }
   /// max_i |p_i|
   double largest_norm() const {
     return maximum<S>("largest_norm", objective_.size(), 0.0,
@@ -78,6 +80,7 @@ public:
   /// Largest step along p, or -p if `backwards`, up to `at_most` that is valid; to be asked for
   /// before the first move.
   double max_length(double at_most, bool backwards) {
+    if (!backwards && at_most <= valid_) return at_most;
     if (!backwards) return max_step(at_most);
     kernels::Reverse<P, S> const reverse{fields_.direction};
     for_each<S>("reverse", objective_.size(), reverse);
@@ -138,6 +141,7 @@ private:
   LocalMatrices<P, S> const curvature_;
   double slope_, energy_unit_, negligible_;
   double form_ = std::numeric_limits<double>::quiet_NaN();
+  double valid_ = 0;      ///< how far along p is known to be valid from elsewhere
   double certified_ = 0;  ///< how far along p or -p is known to be valid, where p'Hp has told
   double length_ = 0;
   bool moved_ = false;

@@ -6,6 +6,7 @@
 
 #include <taut/integrators/beta.hpp>
 #include <taut/integrators/descent.hpp>
+#include <taut/integrators/island_descent.hpp>
 
 namespace taut {
 namespace kernels {
@@ -104,6 +105,31 @@ public:
     z_before_ = Vectors("z_before", pointwise ? 0 : n);
   }
 
+  /// Whether to go by islands (island_descent.hpp).
+  template <class E, class M, class Params>
+  bool splits(E& e, M const& preconditioner, Params const& params) const {
+    if constexpr (DivisibleObjective<E>) {
+      return params.splitting.by_islands && preconditioner.pointwise() && e.scale().has_inertia &&
+             e.divisible() && (e.bodies().count > 1 || !e.asleep().empty());
+    } else {
+      return false;
+    }
+  }
+  template <class E, class M, class Search, class Rule, class Params>
+  MinimiserReport minimise_split(E& e, VectorField<typename P::position, S> const& x,
+                                 DescentFields<P, S>& fields, M& preconditioner,
+                                 Search const& search, Rule& rule, Params const& params,
+                                 Observer<P, S> const& observer) {
+    if constexpr (DivisibleObjective<E>) {
+      islands_.resize(e.bodies(), e.size());
+      return IslandDescent(e, x, fields, islands_, preconditioner, beta_, search, rule,
+                           params.budget, params.safeguard, observer)
+          .run();
+    } else {
+      throw Error("this objective knows of no bodies: it cannot be minimised by islands");
+    }
+  }
+
   void start() { restart(); }
   void restart() { restarted_ = true; }
 
@@ -166,6 +192,7 @@ private:
   bool restarted_ = true;
   Dots dots_;
   Vectors z_, z_before_;
+  Islands<P, S> islands_;
 };
 
 template <class Beta, class Preconditioner, class LineSearch, class Stopping>
@@ -176,6 +203,7 @@ struct NcgComposition {
   typename Stopping::Params stop = {};
   Budget budget = {};
   Safeguard safeguard = {};
+  Splitting splitting = {};
 };
 
 /// For example Ncg<DaiKou, BlockJacobi>, whose Params are {.beta = .., .preconditioner = .., and so

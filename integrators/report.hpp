@@ -3,6 +3,7 @@
 
 #include <taut/core/exec/space.hpp>
 
+#include <algorithm>
 #include <functional>
 #include <limits>
 #include <string_view>
@@ -69,6 +70,13 @@ struct MinimiserReport {
   double error_floor_m = 0;
   double gradient_norm = 0;  ///< |M^-1 g|, mass-weighted rms at the start of the last step, m
   double seconds = 0;
+  int bodies = 1;   ///< that minimisers which go by islands can tell apart
+  int islands = 1;  ///< the most there were at a time
+  int left = 0;     ///< islands that ended while others went on
+  int woken = 0;    ///< of these, and of sleeping bodies, those that something came to act on
+  int asleep = 0;   ///< bodies that slept through it (sleep.hpp)
+  /// Mean share of the unknowns that iterations worked on: less than 1 where islands left early.
+  double active = 1;
 
   bool converged() const {
     return stop == Stop::converged_by_decrement || stop == Stop::converged_by_energy_drop ||
@@ -91,6 +99,12 @@ inline MinimiserReport in_sequence(MinimiserReport const& first, MinimiserReport
   r.refreshes += first.refreshes;
   r.energy_change += first.energy_change;
   r.seconds += first.seconds;
+  r.islands = std::max(first.islands, second.islands);
+  r.left += first.left;
+  r.woken += first.woken;
+  if (r.iterations > 0) {
+    r.active = (first.active * first.iterations + second.active * second.iterations) / r.iterations;
+  }
   return r;
 }
 

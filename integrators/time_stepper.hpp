@@ -22,6 +22,7 @@
 #include <taut/core/potential/objective.hpp>
 #include <taut/core/report/error.hpp>
 #include <taut/integrators/report.hpp>
+#include <taut/integrators/sleep.hpp>
 
 #include <cmath>
 
@@ -170,9 +171,10 @@ public:
   using Params = typename Minimiser::Params;
 
   TimeStepper() = default;
-  /// Throws Error unless there is at least one pass.
-  explicit TimeStepper(Params const& params, Lagging const& lagging = {})
-      : minimiser_(params), lagging_(lagging) {
+  /// Throws Error unless there is at least one pass, and where sleep makes no sense.
+  explicit TimeStepper(Params const& params, Lagging const& lagging = {},
+                       typename Sleep<Precision, Space>::Params const& sleep = {})
+      : minimiser_(params), lagging_(lagging), sleep_(sleep) {
     if (lagging.passes < 1) {
       throw Error("a time step of {} minimisations: give 1 pass or more", lagging.passes);
     }
@@ -191,6 +193,8 @@ public:
   }
 
   Minimiser& minimiser() { return minimiser_; }
+  /// Who sleeps; its quiet steps belong to a checkpoint.
+  Sleep<Precision, Space>& sleep() { return sleep_; }
   /// Where the last minimisation ended, m: what the state is now, unless the step was refused.
   Positions const& reached() const { return x_; }
 
@@ -212,6 +216,7 @@ private:
     potential.begin_step(state.x, r.scale * (R::inertia ? h * h : 1.0), h * std::sqrt(r.scale),
                          R::inertia);
     potential.predict(x_);
+    if (R::inertia) sleep_.lie(potential, state.x, x_, h);
     start(potential, state);
     auto report = minimiser_.minimise(potential, x_, observer);
     for (int pass = 1; pass < lagging_.passes && report.stop != Stop::non_finite; ++pass) {
@@ -221,6 +226,7 @@ private:
     if (report.stop == Stop::non_finite) return report;
     for_each<Space>("finish_step", n,
                     kernels::FinishStep<Precision, Space>{state, x_, r.c / h, r.c0 / h, r.c1 / h});
+    if (R::inertia) sleep_.settle(potential, state);
     Kokkos::fence("taut: step");
     state.time += h;
     state.last_step = h;
@@ -246,6 +252,7 @@ private:
 
   Minimiser minimiser_;
   Lagging lagging_;
+  Sleep<Precision, Space> sleep_;
   Positions x_;
   VectorField<typename Precision::real, Space> direction_;
 };

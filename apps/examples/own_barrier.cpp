@@ -1,7 +1,7 @@
 // Contact, with a barrier of one's own: a block falls onto another one that is held.
-#include <taut/contact/connected.hpp>
 #include <taut/contact/contact.hpp>
 #include <taut/core/fem/body.hpp>
+#include <taut/core/fem/connected.hpp>
 #include <taut/core/fem/elastic_tets.hpp>
 #include <taut/core/fem/shapes.hpp>
 #include <taut/core/potential/potential.hpp>

@@ -1,6 +1,6 @@
 #include <taut/apps/program/intersections.hpp>
 
-#include <taut/contact/connected.hpp>
+#include <taut/core/fem/connected.hpp>
 
 #include <fmt/format.h>
 

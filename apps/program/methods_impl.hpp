@@ -68,6 +68,9 @@ private:
     params.stop = stopping(window(8));
     params.budget.max_iterations = options_.integer("max_iterations");
     params.safeguard.on = options_.flag("safeguard");
+    if constexpr (requires { params.splitting; }) {
+      params.splitting.by_islands = options_.flag("islands");
+    }
     return std::make_unique<Holder<Minimiser>>(params);
   }
 

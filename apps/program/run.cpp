@@ -61,16 +61,20 @@ struct Totals {
   double cut_steps = 0;                    ///< steps in which a bound cut an iteration
   double contacts = 0, most_contacts = 0;  ///< at the ends of steps
   double smallest_gap = 1;                 ///< of these, over the distance of contact
+  double work = 0;          ///< iterations, each times the share of unknowns it worked on
+  double most_islands = 0;  ///< in one step
 
   std::vector<double> to_numbers() const {
-    return {seconds,       steps,          converged, iterations, restarts,      worst_error,
-            most_inverted, inverted_steps, cut_steps, contacts,   most_contacts, smallest_gap};
+    return {seconds,       steps,         converged,      iterations,  restarts,
+            worst_error,   most_inverted, inverted_steps, cut_steps,   contacts,
+            most_contacts, smallest_gap,  work,           most_islands};
   }
   static Totals from_numbers(std::vector<double> const& n) {
-    if (n.size() != 12) throw Error("the checkpoint's totals are not twelve numbers");
-    return {n[0], n[1], n[2], n[3], n[4], n[5], n[6], n[7], n[8], n[9], n[10], n[11]};
+    if (n.size() != 14) throw Error("the checkpoint's totals are not fourteen numbers");
+    return {n[0], n[1], n[2], n[3], n[4], n[5], n[6], n[7], n[8], n[9], n[10], n[11], n[12], n[13]};
   }
   double mean_iterations() const { return steps > 0 ? iterations / steps : 0; }
+  double mean_work() const { return steps > 0 ? work / steps : 0; }
   double per_second() const { return seconds > 0 ? steps / seconds : 0; }
 };
 
@@ -220,6 +224,8 @@ private:
     totals_.seconds += seconds;
     ++totals_.steps;
     totals_.iterations += r.iterations;
+    totals_.work += r.active * r.iterations;
+    totals_.most_islands = std::max(totals_.most_islands, double(r.islands));
     totals_.converged += r.converged();
     totals_.restarts += static_cast<double>(r.restarts.total());
     Record line;
@@ -242,6 +248,11 @@ private:
         .set("backtracks", r.backtracks)
         .set("cuts", r.cuts)
         .set("refreshes", r.refreshes)
+        .set("islands", r.islands)
+        .set("left", r.left)
+        .set("woken", r.woken)
+        .set("asleep", r.asleep)
+        .set("active", r.active)
         .set("linear_iterations", r.linear_iterations)
         .set("seconds", seconds);
     totals_.cut_steps += r.cuts > 0;
@@ -332,6 +343,8 @@ private:
         .set("frames_asked", scene_.frames)
         .set("steps_converged", static_cast<std::int64_t>(totals_.converged))
         .set("mean_iterations", totals_.mean_iterations())
+        .set("mean_work", totals_.mean_work())
+        .set("most_islands", static_cast<std::int64_t>(totals_.most_islands))
         .set("restarts", static_cast<std::int64_t>(totals_.restarts))
         .set("largest_error_estimate_m", totals_.worst_error)
         .set("most_inverted_elements", static_cast<std::int64_t>(totals_.most_inverted))

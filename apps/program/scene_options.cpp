@@ -81,6 +81,20 @@ std::span<OptionKey const> solver_keys() {
        {},
        {},
        "restart where descent is lost or a bound has cut the step; off: the paper as printed"},
+      {"islands",
+       true,
+       {},
+       {},
+       "bodies that may touch have a direction weight, a step, a bound and an end of their own: "
+       "nonlinear CG with inertia and a pointwise preconditioner, on several bodies"},
+      {"sleep_speed",
+       0.0,
+       {.min = 0, .max = 1e9, .unit = "m/s"},
+       {},
+       "bodies that have been slower for sleep_steps steps leave the steps until something comes "
+       "to "
+       "act on them; 0: none does. What creeps slower than this stops"},
+      {"sleep_steps", 20, {.min = 1, .max = 1e6}, {}, "slow steps in a row before bodies sleep"},
   };
   return keys;
 }

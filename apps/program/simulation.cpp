@@ -56,8 +56,8 @@ public:
         forces_("forces", size()),
         fixed_(Kokkos::create_mirror_view(potential_.unknowns().fixed)),
         prescribed_(Kokkos::create_mirror_view(potential_.unknowns().prescribed)),
-        euler_(scene_.solver, lagging()),
-        bdf2_(scene_.solver, lagging()),
+        euler_(scene_.solver, lagging(), sleep()),
+        bdf2_(scene_.solver, lagging(), sleep()),
         static_(scene_.solver, lagging()) {
     write(state_.x, geometry.start, mesh_.points);
     write(state_.v, geometry.velocity, std::vector<Point>(size()));
@@ -118,6 +118,7 @@ public:
     checkpoint.set("last_step", std::vector<double>{state_.last_step});
     checkpoint.set("steps", std::vector<std::int32_t>{state_.steps});
     for (auto const& [name, field] : fields()) checkpoint.set(name, flat(field));
+    if (sleep().on) checkpoint.set("quiet_steps", quiet_);
     std::vector<double> numbers;
     for (RigidMap const& pose : poses()) {
       for (Point const& row : pose.rotation) numbers.insert(numbers.end(), row.begin(), row.end());
@@ -140,6 +141,11 @@ public:
       for (int i = 0; i < size(); ++i)
         for (int c = 0; c < 3; ++c) host(i, c) = numbers[3 * i + c];
       Kokkos::deep_copy(field, host);
+    }
+    if (sleep().on) {
+      quiet_ = checkpoint.get<std::int32_t>("quiet_steps");
+      euler_.sleep().set_quiet(quiet_);
+      bdf2_.sleep().set_quiet(quiet_);
     }
     std::vector<RigidMap> read_poses = poses();
     if (read_poses.empty()) return;
@@ -271,6 +277,23 @@ private:
     }
     contact_->add_to(friction, of_pairs);
     terms.add(friction);
+  }
+  typename Sleep<P, DefaultSpace>::Params sleep() const {
+    double const speed = scene_.solver.number("sleep_speed");
+    if (!(speed > 0)) return {};
+    std::string const& preconditioner = scene_.solver.text("preconditioner");
+    std::string const& method = scene_.solver.text("method");
+    bool const by_islands = scene_.solver.flag("islands") &&
+                            !preconditioner.starts_with("schwarz") && method != "newton" &&
+                            method != "lbfgs" && method != "chebyshev";
+    if (!by_islands || scene_.scheme == TimeScheme::quasi_static) {
+      throw Error(
+          "{}: solver.sleep_speed needs islands, which method = \"{}\" with preconditioner = "
+          "\"{}\" does not go by here: choose nonlinear CG with inertia, a pointwise "
+          "preconditioner and islands = true, or sleep_speed = 0",
+          scene_.file.string(), method, preconditioner);
+    }
+    return {.on = true, .speed = speed, .steps = scene_.solver.integer("sleep_steps")};
   }
   Lagging lagging() const {
     return {scene_.contact ? scene_.contact->integer("friction_passes") : 1};
@@ -494,6 +517,7 @@ private:
     auto const run = [&](auto& stepper) {
       NewtonReport const report = stepper.step(potential_, state_, h, observer);
       reached_ = stepper.reached();
+      quiet_ = stepper.sleep().quiet();
       return report;
     };
     switch (scene_.scheme) {
@@ -560,6 +584,7 @@ private:
   ProgramPotential<P> potential_;
   State<P> state_;
   Positions reached_;  ///< by the last minimisation, also where the step was then refused
+  std::vector<std::int32_t> quiet_;  ///< steps in a row, per body; of sleep
   Vectors forces_;
   typename FixedMask<DefaultSpace>::HostMirror fixed_;
   typename Positions::HostMirror prescribed_;

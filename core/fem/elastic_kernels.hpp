@@ -78,6 +78,10 @@ struct GradientSweep : PatchSweep<S, typename Precision::real> {
   KOKKOS_FUNCTION void operator()(typename S::team_member const& team) const {
     int const patch = team.league_rank();
     auto const& v = this->patches;
+    if (v.idle(patch)) {
+      if (after_step) Kokkos::single(Kokkos::PerTeam(team), [&]() { change(patch) = 0; });
+      return;
+    }
     ScratchField<S, Real> const local_x(team.team_scratch(0), 4 * v.max_locals);
     ScratchField<S, Real> const local_p(team.team_scratch(0), after_step ? 4 * v.max_locals : 0);
     ScratchField<S, Real> const slots(team.team_scratch(0), this->slot_numbers(numbers()));
@@ -204,6 +208,13 @@ struct MeasureSweep : PatchSweep<S, typename Precision::real> {
   KOKKOS_FUNCTION void operator()(typename S::team_member const& team) const {
     int const patch = team.league_rank();
     auto const& v = this->patches;
+    if (v.idle(patch)) {
+      Kokkos::single(Kokkos::PerTeam(team), [&]() {
+        total(patch) = 0;
+        if constexpr (certifies) certified(patch) = Kokkos::Experimental::infinity_v<double>;
+      });
+      return;
+    }
     ScratchField<S, Real> const local_x(team.team_scratch(0), 4 * v.max_locals);
     ScratchField<S, Real> const local_p(team.team_scratch(0), 4 * v.max_locals);
     ScratchField<S, double> const energies(team.team_scratch(0), v.max_packs * Base::per_pack);
@@ -260,6 +271,31 @@ struct GatherShared {
       for (int c = 0; c < numbers; ++c) sum[c] += from[c];
     }
     output.template add<numbers>(patches.shared(i), sum);
+  }
+};
+
+/// What the patches of a body left, times `scale`, goes to one vertex of it.
+template <class S, class Sum>
+struct ShareByBody {
+  Kokkos::View<int const*, typename S::memory, Kokkos::MemoryTraits<Kokkos::RandomAccess>> begin,
+      patch, vertex;  ///< per body, +1: its patches; and a vertex of it
+  Kokkos::View<Sum*, typename S::memory> total;
+  double scale;
+  Array<double, S> shares;
+  KOKKOS_FUNCTION void operator()(int b) const {
+    double sum = 0;
+    for (int k = begin(b); k < begin(b + 1); ++k) sum += double(total(patch(k)));
+    shares(vertex(b)) += scale * sum;
+  }
+};
+
+/// Marks the patches of idle vertices.
+template <class S, class Real>
+struct MarkPatches {
+  PatchViews<S, Real> patches;
+  Kokkos::View<std::uint8_t*, typename S::memory> idle;  ///< per vertex; or empty
+  KOKKOS_FUNCTION void operator()(int p) const {
+    patches.idle(p) = idle.extent(0) > 0 ? idle(patches.vertex(patches.local_begin(p))) : 0;
   }
 };
 

@@ -1,6 +1,7 @@
 // Elastic energy of linear tetrahedra, V(x) = Sum_e W_e Psi(F_e): a swept term of the potential.
 #pragma once
 
+#include <taut/core/exec/buckets.hpp>
 #include <taut/core/fem/elastic_kernels.hpp>
 #include <taut/core/fem/element_material.hpp>
 #include <taut/core/fem/inversion_sweeps.hpp>
@@ -8,6 +9,7 @@
 #include <taut/core/potential/term.hpp>
 #include <taut/core/report/error.hpp>
 
+#include <algorithm>
 #include <limits>
 
 namespace taut {
@@ -108,6 +110,11 @@ public:
 
   void elements(std::vector<Connectivity>& kinds) const { kinds.push_back({vertices_, 4}); }
 
+  void add_form_shares(Positions const& x, Vectors const& p, double scale, FixedMask<Space> const&,
+                       Array<double, Space> const& shares) const;
+  /// A patch belongs to one body: it is idle if its first vertex is.
+  void set_idle(IdleMask<Space> const& idle) const;
+
 private:
   using Sum = typename Precision::sum;
   using Scratch = Kokkos::View<Real*, typename Space::memory>;
@@ -126,11 +133,16 @@ private:
 
   template <kernels::Measure what>
   double measured(char const* name, Positions const& x, Vectors const& p, double alpha) const {
+    measure_patches<what>(name, x, p, alpha);
+    return reducer_.template finish<1>(name, patches_.count)[0];
+  }
+  /// Leaves the sum of each patch in reducer_.partials().
+  template <kernels::Measure what>
+  void measure_patches(char const* name, Positions const& x, Vectors const& p, double alpha) const {
     using Kernel = kernels::MeasureSweep<Space, Precision, Material, what>;
     run(name,
         Kernel{
             {patches_}, materials_, x, p, static_cast<Real>(alpha), reducer_.partials(), bounds_});
-    return reducer_.template finish<1>(name, patches_.count)[0];
   }
 
   typename Space::team_policy policy(std::size_t scratch_bytes) const {
@@ -158,9 +170,10 @@ private:
   Kokkos::View<MaterialParameters const*, typename Space::memory,
                Kokkos::MemoryTraits<Kokkos::RandomAccess>>
       materials_;
-  std::vector<
-      Kokkos::View<int const*, typename Space::memory, Kokkos::MemoryTraits<Kokkos::RandomAccess>>>
-      colours_;
+  using Indices =
+      Kokkos::View<int const*, typename Space::memory, Kokkos::MemoryTraits<Kokkos::RandomAccess>>;
+  std::vector<Indices> colours_;
+  Indices body_begin_, body_patch_, body_vertex_;  ///< see ShareByBody
   std::vector<int> vertices_;
   Reducer<Space, Sum> reducer_;
   mutable Scratch partial_;
@@ -196,6 +209,18 @@ ElasticTets<Material, Precision, Space>::ElasticTets(
   for (auto const& colour : host.colours) {
     colours_.push_back(to_space<Space>("patch_colour", colour));
   }
+  std::vector<int> body_vertex(host.body);
+  std::sort(body_vertex.begin(), body_vertex.end());
+  body_vertex.erase(std::unique(body_vertex.begin(), body_vertex.end()), body_vertex.end());
+  std::vector<int> body_of_patch;
+  for (int v : host.body) {
+    auto const at = std::lower_bound(body_vertex.begin(), body_vertex.end(), v);
+    body_of_patch.push_back(static_cast<int>(at - body_vertex.begin()));
+  }
+  Buckets const by_body = sort_into_buckets(body_of_patch, static_cast<int>(body_vertex.size()));
+  body_begin_ = to_space<Space>("body_patches_begin", by_body.begin);
+  body_patch_ = to_space<Space>("body_patches", by_body.item);
+  body_vertex_ = to_space<Space>("body_vertex", body_vertex);
   vertices_.reserve(4 * rest.tets.size());
   for (Tet const& tet : rest.tets) vertices_.insert(vertices_.end(), tet.begin(), tet.end());
   reducer_ = Reducer<Space, Sum>::of_partials(patches_.count);
@@ -209,6 +234,22 @@ double ElasticTets<Material, Precision, Space>::measure(kernels::Measure what, P
   if (what == Measure::energy) return measured<Measure::energy>("elastic_energy", x, p, alpha);
   if (what == Measure::change) return measured<Measure::change>("elastic_change", x, p, alpha);
   return measured<Measure::form>("elastic_quadratic_form", x, p, alpha);
+}
+
+template <ElementMaterial Material, class Precision, class Space>
+void ElasticTets<Material, Precision, Space>::add_form_shares(
+    Positions const& x, Vectors const& p, double scale, FixedMask<Space> const&,
+    Array<double, Space> const& shares) const {
+  measure_patches<kernels::Measure::form>("elastic_quadratic_form", x, p, 0);
+  for_each<Space>("elastic_shares", body_vertex_.extent_int(0),
+                  kernels::ShareByBody<Space, Sum>{body_begin_, body_patch_, body_vertex_,
+                                                   reducer_.partials(), scale, shares});
+}
+
+template <ElementMaterial Material, class Precision, class Space>
+void ElasticTets<Material, Precision, Space>::set_idle(IdleMask<Space> const& idle) const {
+  for_each<Space>("elastic_idle", patches_.count,
+                  kernels::MarkPatches<Space, Real>{patches_, idle});
 }
 
 template <ElementMaterial Material, class Precision, class Space>
@@ -284,8 +325,8 @@ void ElasticTets<Material, Precision, Space>::provide_partial(Output& to, int nu
                 patches_.vertices, to.fixed.extent(0));
   std::size_t const needed = std::size_t(numbers) * patches_.shared_rows;
   if (partial_.extent(0) < needed) {
-    partial_ = Scratch(
-        Kokkos::view_alloc(Kokkos::WithoutInitializing, std::string("elastic_partial")), needed);
+    // Zeros: rows of idle patches are read, if for nothing, before they are first written.
+    partial_ = Scratch("elastic_partial", needed);
   }
   to.partial = partial_;
 }

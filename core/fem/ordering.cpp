@@ -1,3 +1,4 @@
+#include <taut/core/fem/connected.hpp>
 #include <taut/core/fem/ordering.hpp>
 
 #include <algorithm>
@@ -62,11 +63,21 @@ Ordering locality_order(TetMesh const& mesh, std::span<std::int32_t const> group
     key[t] = hilbert_index(cell);
   }
 
+  // A body is where the first of its tets is along the curve.
+  std::vector<std::int32_t> const body = smallest_connected(mesh.points.size(), mesh.tets);
+  std::vector<std::uint64_t> first(mesh.points.size(), ~std::uint64_t(0));
+  for (std::size_t t = 0; t < count; ++t) {
+    std::uint64_t& least = first[body[mesh.tets[t][0]]];
+    least = std::min(least, key[t]);
+  }
+
   Ordering order;
   order.tets.resize(count);
   std::iota(order.tets.begin(), order.tets.end(), 0);
   std::sort(order.tets.begin(), order.tets.end(), [&](std::int32_t a, std::int32_t b) {
     if (!group.empty() && group[a] != group[b]) return group[a] < group[b];
+    std::int32_t const of_a = body[mesh.tets[a][0]], of_b = body[mesh.tets[b][0]];
+    if (of_a != of_b) return first[of_a] != first[of_b] ? first[of_a] < first[of_b] : of_a < of_b;
     return key[a] != key[b] ? key[a] < key[b] : a < b;
   });
 

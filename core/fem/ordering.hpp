@@ -16,7 +16,7 @@ struct Ordering {
 };
 
 /// `group[t]` (may be empty) is the part that tet t belongs to: tets of a part stay together, in
-/// ascending order of the part.
+/// ascending order of the part, and within it those of one body (tets that are connected).
 Ordering locality_order(TetMesh const& mesh, std::span<std::int32_t const> group = {});
 
 }  // namespace taut

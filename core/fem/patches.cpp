@@ -1,4 +1,5 @@
 #include <taut/core/exec/buckets.hpp>
+#include <taut/core/fem/connected.hpp>
 #include <taut/core/fem/patches.hpp>
 #include <taut/core/report/error.hpp>
 
@@ -54,9 +55,14 @@ Patches make_patches(std::span<Tet const> tets, std::span<int const> material, i
   p.incidence_begin = {0};
   std::vector<int> local_of(vertices, -1);  // local index of a vertex in the patch being built
   int const count = static_cast<int>(tets.size());
+  std::vector<std::int32_t> const body = smallest_connected<4>(vertices, tets);
   for (int first = 0; first < count;) {
     int last = first;
-    while (last < count && last - first < patch_size && material[last] == material[first]) ++last;
+    auto const fits = [&](int t) {
+      return t - first < patch_size && material[t] == material[first] &&
+             body[tets[t][0]] == body[tets[first][0]];
+    };
+    while (last < count && fits(last)) ++last;
     int const packs = (last - first + lanes - 1) / lanes;
     int const pack0 = p.pack_begin.back(), local0 = p.local_begin.back();
     p.corner.resize(std::size_t(pack0 + packs) * 4 * lanes);
@@ -97,6 +103,7 @@ Patches make_patches(std::span<Tet const> tets, std::span<int const> material, i
     p.pack_begin.push_back(pack0 + packs);
     p.local_begin.push_back(static_cast<int>(p.vertex.size()));
     p.material.push_back(material[first]);
+    p.body.push_back(body[tets[first][0]]);
     p.max_packs = std::max(p.max_packs, packs);
     p.max_locals = std::max(p.max_locals, locals);
     first = last;

@@ -27,6 +27,7 @@ struct Patches {
   std::vector<int> pack_begin;            ///< per patch, +1: its packs
   std::vector<int> local_begin;           ///< per patch, +1: its local vertices
   std::vector<int> material;              ///< per patch
+  std::vector<int> body;                  ///< per patch: the smallest vertex of its body
   std::vector<int> vertex;                ///< per local vertex: vertex of the mesh
   std::vector<int> tet;                   ///< per element: index into the list
   std::vector<char> padding;              ///< per element: 1 for a padding copy
@@ -45,7 +46,8 @@ struct Patches {
 };
 
 /// `tets` in locality-preserving order, with vertices below `vertices`; `material[t]` of each. A
-/// patch holds up to `patch_size` tets of one material. Throws Error unless patch_size is 1 to
+/// patch holds up to `patch_size` tets of one material and one body (tets that are connected), so
+/// that sweeps can leave a body out and sum up for each. Throws Error unless patch_size is 1 to
 /// 4096.
 Patches make_patches(std::span<Tet const> tets, std::span<int const> material, int vertices,
                      int lanes, int patch_size);
@@ -63,6 +65,8 @@ struct PatchViews {
   int count = 0, vertices = 0, shared_rows = 0, max_locals = 0, max_packs = 0;
   Data<int> pack_begin, local_begin, material, vertex, incidence_begin, shared, shared_begin, row;
   Data<std::uint16_t> corner, incidence;
+  /// Per patch: not 0 while sweeps leave it out. The one thing here that changes.
+  Kokkos::View<std::uint8_t*, typename S::memory> idle;
   /// [pack][10][lane]: the inverse rest shape B = Dm^-1 by columns, then the rest volume W.
   Data<Real> rest;
 };
@@ -106,6 +110,7 @@ PatchViews<S, Real> copy_patches(Patches const& patches, std::vector<double> con
     }
   }
   v.rest = to_space<S>("patch_rest", packed);
+  v.idle = decltype(v.idle)("patch_idle", v.count);
   return v;
 }
 

@@ -25,6 +25,7 @@ public:
   using Blocks = BlockField<typename Precision::real, Space>;
   using Matrix = BlockCsr<Space, double>;
   using Fixed = FixedMask<Space>;
+  using Indices = typename Bodies<Space>::Indices;
 
   template <SweptTerm Term>
   void add(Term term) {
@@ -100,6 +101,25 @@ public:
   }
   bool empty() const { return terms_.empty(); }
 
+  bool divisible() const {
+    return std::all_of(terms_.begin(), terms_.end(), [](auto const& t) { return t->divisible(); });
+  }
+  void add_form_shares(Positions const& x, Vectors const& p, double scale, Fixed const& fixed,
+                       Array<double, Space> const& shares) const {
+    for (auto const& t : terms_) t->add_form_shares(x, p, scale, fixed, shares);
+  }
+  void lasting_elements(std::vector<Connectivity>& kinds) const {
+    for (auto const& t : terms_) t->lasting_elements(kinds);
+  }
+  bool link(Fixed const& fixed, Indices const& body, Indices const& label) const {
+    bool changed = false;
+    for (auto const& t : terms_) changed = t->link(fixed, body, label) || changed;
+    return changed;
+  }
+  void set_idle(IdleMask<Space> const& idle) const {
+    for (auto const& t : terms_) t->set_idle(idle);
+  }
+
   void begin_step(StepStart<Precision, Space> const& start) const requires stepped {
     for (auto const& t : terms_) t->begin_step(start);
   }
@@ -146,6 +166,12 @@ private:
     virtual void elements(std::vector<Connectivity>&) const = 0;
     virtual std::int64_t pattern_version(Positions const&) const = 0;
     virtual std::optional<Obstruction> obstruction() const = 0;
+    virtual bool divisible() const = 0;
+    virtual void add_form_shares(Positions const&, Vectors const&, double, Fixed const&,
+                                 Array<double, Space> const&) const = 0;
+    virtual void lasting_elements(std::vector<Connectivity>&) const = 0;
+    virtual bool link(Fixed const&, Indices const&, Indices const&) const = 0;
+    virtual void set_idle(IdleMask<Space> const&) const = 0;
     virtual void begin_step(StepStart<Precision, Space> const&) const = 0;
     virtual bool relag(Positions const&) const = 0;
     virtual double motion_left(Positions const&) const = 0;
@@ -212,6 +238,25 @@ private:
     std::optional<Obstruction> obstruction() const override {
       if constexpr (ObstructedTerm<Term>) return term.obstruction();
       return {};
+    }
+    bool divisible() const override { return divides(term); }
+    void add_form_shares(Positions const& x, Vectors const& p, double h, Fixed const& f,
+                         Array<double, Space> const& shares) const override {
+      if constexpr (DivisibleTerm<Term>) {
+        term.add_form_shares(x, p, h, f, shares);
+      } else {
+        throw Error("a term of the list cannot say where its curvature is: see DivisibleTerm");
+      }
+    }
+    void lasting_elements(std::vector<Connectivity>& kinds) const override {
+      taut::lasting_elements(term, kinds);
+    }
+    bool link(Fixed const& fixed, Indices const& body, Indices const& label) const override {
+      if constexpr (LinkingTerm<Term>) return term.link(fixed, body, label);
+      return false;
+    }
+    void set_idle(IdleMask<Space> const& idle) const override {
+      if constexpr (IdlingTerm<Term>) term.set_idle(idle);
     }
     void begin_step(StepStart<Precision, Space> const& start) const override {
       if constexpr (SteppedTerm<Term>) term.begin_step(start);

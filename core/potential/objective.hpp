@@ -7,6 +7,7 @@
 #pragma once
 
 #include <taut/core/exec/space.hpp>
+#include <taut/core/potential/term.hpp>
 #include <taut/core/sparse/block_csr.hpp>
 
 #include <concepts>
@@ -89,6 +90,33 @@ concept CertifyingObjective = Objective<E> &&
   /// max_step at the x and p for which quadratic_form has said `certified`, which spares the terms
   /// that can tell a search where it is enough.
   { e.max_step(x, p, at_most, certified) } -> std::convertible_to<double>;
+};
+
+/// An Objective that knows of bodies and islands (bodies.hpp), and can leave some out.
+template <class E>
+concept DivisibleObjective = Objective<E> &&
+    requires(E& e, VectorField<typename E::Precision::position, typename E::Space> const& x,
+             VectorField<typename E::Precision::real, typename E::Space> const& p,
+             Array<double, typename E::Space> const& shares,
+             IdleMask<typename E::Space> const& idle,
+             typename Bodies<typename E::Space>::Indices const& label) {
+  /// False if a term does not tell.
+  { e.divisible() } -> std::convertible_to<bool>;
+  { e.bodies() } -> std::convertible_to<Bodies<typename E::Space>>;
+  { e.fixed() } -> std::convertible_to<FixedMask<typename E::Space>>;
+  /// Gives bodies that may act on each other until `pattern_version` changes a common label.
+  {e.link(label)};
+  /// Makes `shares` of p'Hp per unknown, which sum up to that of p restricted to each island.
+  {e.form_shares(x, p, shares)};
+  /// From now on no term looks at elements of what is idle; what is handed out for these unknowns
+  /// means nothing.
+  {e.set_idle(idle)};
+  /// Per body: not 0 while it is to stay where it is unless something comes to act on it; empty:
+  /// none.
+  { e.asleep() } -> std::convertible_to<std::vector<char>>;
+  {e.set_asleep(std::vector<char>())};
+  /// What the last max_step was cut by, if that is known.
+  { e.obstruction() } -> std::same_as<std::optional<Obstruction>>;
 };
 
 }  // namespace taut

@@ -150,6 +150,18 @@ struct LocalProduct {
   }
 };
 
+/// What each unknown has of p'Hp of the local terms.
+template <class S, class Precision, class Kernel>
+struct LocalShares {
+  LocalForm<S, Precision, Kernel> form;
+  Array<double, S> shares;
+  KOKKOS_FUNCTION void operator()(int i) const {
+    Sums<typename Precision::sum, 1> sum;
+    form(i, sum);
+    shares(i) = double(sum[0]);
+  }
+};
+
 /// Sets the diagonal blocks to the local curvature (to the mass where fixed), all others to zero.
 template <class S, class Precision, class Kernel>
 struct LocalAssemble {
@@ -447,6 +459,57 @@ public:
     return true;
   }
 
+  // For minimisers that go by bodies and islands (DivisibleObjective).
+  bool divisible() const {
+    bool all = true;
+    for_each_swept([&](auto const& term) { all = all && divides(term); });
+    return all;
+  }
+  Bodies<Space> const& bodies() {
+    if (bodies_.of.extent_int(0) != size()) {
+      std::vector<Connectivity> kinds;
+      for_each_swept([&](auto const& term) { lasting_elements(term, kinds); });
+      bodies_ = make_bodies<Space>(size(), kinds);
+    }
+    return bodies_;
+  }
+  FixedMask<Space> const& fixed() const { return unknowns_.fixed; }
+  void link(typename Bodies<Space>::Indices const& label) {
+    int changed = 1;
+    while (changed != 0) {
+      changed = 0;
+      for_each_of<is_linking>([&](auto const& term) {
+        if (term.link(unknowns_.fixed, bodies().of, label)) changed = 1;
+      });
+      changed = maximum<Space>("follow_labels", bodies().count, changed,
+                               kernels::FollowLabels<Space>{label});
+    }
+  }
+  void form_shares(Positions const& x, Vectors const& p, Array<double, Space> const& shares) const {
+    auto const local = locals();
+    using Form = kernels::LocalForm<Space, Precision, std::decay_t<decltype(local)>>;
+    using Kernel = kernels::LocalShares<Space, Precision, std::decay_t<decltype(local)>>;
+    for_each<Space>("local_shares", size(), Kernel{Form{local, unknowns_.fixed, x, p}, shares});
+    for_each_of<is_divisible>(
+        [&](auto const& term) { term.add_form_shares(x, p, scale_, unknowns_.fixed, shares); });
+  }
+  void set_idle(IdleMask<Space> const& idle) const {
+    for_each_of<is_idling>([&](auto const& term) { term.set_idle(idle); });
+  }
+  /// Bodies that are to stay where they are, at rest, unless something comes to act on them; empty:
+  /// none. Minimisers that go by islands heed it, and say who has been woken.
+  void set_asleep(std::vector<char> asleep) { asleep_ = std::move(asleep); }
+  std::vector<char> const& asleep() const { return asleep_; }
+  /// Bounds are looked for one term after the other, none longer than the one before: the last
+  /// that was cut counts.
+  std::optional<Obstruction> obstruction() const {
+    std::optional<Obstruction> last;
+    for_each_of<is_obstructed>([&](auto const& term) {
+      if (auto found = term.obstruction()) last = std::move(found);
+    });
+    return last;
+  }
+
   /// How far what moves by itself has still to go, m.
   double motion_left(Positions const& x) const {
     double left = 0;
@@ -491,6 +554,14 @@ private:
   using is_lagged = std::bool_constant<LaggedTerm<Term>>;
   template <class Term>
   using is_moving = std::bool_constant<MovingTerm<Term>>;
+  template <class Term>
+  using is_divisible = std::bool_constant<DivisibleTerm<Term>>;
+  template <class Term>
+  using is_linking = std::bool_constant<LinkingTerm<Term>>;
+  template <class Term>
+  using is_idling = std::bool_constant<IdlingTerm<Term>>;
+  template <class Term>
+  using is_obstructed = std::bool_constant<ObstructedTerm<Term>>;
 
   template <template <class> class Kind, class Visit>
   void for_each_of(Visit const& visit) const {
@@ -586,6 +657,8 @@ private:
   }
   Unknowns<Precision, Space> unknowns_;
   std::tuple<Terms...> terms_;
+  Bodies<Space> bodies_;
+  std::vector<char> asleep_;
   Vectors direction_;
   Array<Real, Space> stiffness_;  ///< where terms are told of it
   Vectors diagonal_;

@@ -83,6 +83,22 @@ struct StencilForm : StencilData<Kernel, S, Precision> {
   }
 };
 
+/// An element's share is at its first unknown.
+template <class Kernel, class S, class Precision>
+struct StencilShares {
+  StencilForm<Kernel, S, Precision> form;
+  Array<double, S> shares;
+  double scale;
+  KOKKOS_FUNCTION void operator()(int i) const {
+    Sums<double, 1> sum;
+    for (int k = form.incidence_begin(i); k < form.incidence_begin(i + 1); ++k) {
+      if (form.incidence(k) % Kernel::vertices == 0)
+        form(form.incidence(k) / Kernel::vertices, sum);
+    }
+    shares(i) += scale * sum[0];
+  }
+};
+
 /// Adds gradient and curvature (`numbers` of it per unknown) to unknown i; or the product with p.
 template <class Kernel, class S, class Precision, class CurvatureField, int numbers, bool product>
 struct StencilRows : StencilData<Kernel, S, Precision> {
@@ -185,6 +201,12 @@ public:
   double quadratic_form(Positions const& x, Vectors const& p, double scale) const {
     kernels::StencilForm<Kernel, Space, Precision> const form{data(x, p)};
     return scale * reducer_.template sum<1>("stencil_form", count(), form)[0];
+  }
+  void add_form_shares(Positions const& x, Vectors const& p, double scale, Fixed const&,
+                       Array<double, Space> const& shares) const {
+    kernels::StencilForm<Kernel, Space, Precision> const form{data(x, p)};
+    for_each<Space>("stencil_shares", incidence_begin_.extent_int(0) - 1,
+                    kernels::StencilShares<Kernel, Space, Precision>{form, shares, scale});
   }
   void add_gradient(Positions const& x, double scale, Fixed const& fixed, Vectors const& g) const {
     rows<0, false>(x, Vectors(), scale, fixed, g, g);

@@ -11,6 +11,7 @@
 
 #include <taut/core/exec/space.hpp>
 #include <taut/core/math/matrix.hpp>
+#include <taut/core/potential/bodies.hpp>
 #include <taut/core/potential/obstruction.hpp>
 #include <taut/core/sparse/block_csr.hpp>
 
@@ -154,6 +155,61 @@ concept CertifyingTerm = SweptTerm<Term> &&
   /// max_step at the x and p for which quadratic_form has said `certified`.
   { term.max_step(x, p, at_most, certified) } -> std::convertible_to<double>;
 };
+
+/// Marks of unknowns that a minimiser has left where they are for now (not 0), or nothing.
+template <class S>
+using IdleMask = Kokkos::View<std::uint8_t*, typename S::memory>;
+
+/// A term that can say where p'Hp comes from: adds it, times `scale`, in shares to unknowns. The
+/// share of an element is at an unknown of a body whose free unknowns it couples, so that the sum
+/// over an island is p'Hp of p restricted to it.
+template <class Term>
+concept DivisibleTerm = SweptTerm<Term> &&
+    requires(Term const& term,
+             VectorField<typename Term::Precision::position, typename Term::Space> x,
+             VectorField<typename Term::Precision::real, typename Term::Space> p, double scale,
+             FixedMask<typename Term::Space> fixed, Array<double, typename Term::Space> shares) {
+  {term.add_form_shares(x, p, scale, fixed, shares)};
+};
+
+/// A term whose elements do not last. It says instead which bodies they may join until
+/// `pattern_version` grows, by giving them the smaller of their labels (kernels::join_labels); true
+/// if that changed a label.
+template <class Term>
+concept LinkingTerm = ChangingTerm<Term> &&
+    requires(Term const& term, FixedMask<typename Term::Space> fixed,
+             typename Bodies<typename Term::Space>::Indices body) {
+  { term.link(fixed, body, body) } -> std::convertible_to<bool>;
+};
+
+/// A term whose sweeps leave out what is idle altogether: no energy, no gradient (what stands there
+/// is not touched). All elements that it shares with others are idle at all their unknowns or none.
+template <class Term>
+concept IdlingTerm = SweptTerm<Term> &&
+    requires(Term const& term, IdleMask<typename Term::Space> idle) {
+  {term.set_idle(idle)};
+};
+
+/// Whether minimisers may go by bodies and islands where this term is.
+template <SweptTerm Term>
+bool divides(Term const& term) {
+  if constexpr (requires {
+                  { term.divisible() } -> std::convertible_to<bool>;
+                }) {
+    return term.divisible();
+  } else {
+    return DivisibleTerm<Term> && (LinkingTerm<Term> || !ChangingTerm<Term>);
+  }
+}
+/// The elements of a term that last.
+template <SweptTerm Term>
+void lasting_elements(Term const& term, std::vector<Connectivity>& kinds) {
+  if constexpr (requires { term.lasting_elements(kinds); }) {
+    term.lasting_elements(kinds);
+  } else if constexpr (!ChangingTerm<Term>) {
+    term.elements(kinds);
+  }
+}
 
 /// The same of any swept term: one that does not certify leaves `certified` alone, and looks for
 /// its largest step in any case.

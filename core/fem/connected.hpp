@@ -14,7 +14,7 @@ namespace taut {
 /// Per vertex: the smallest vertex that it is connected with, itself included.
 template <std::size_t n>
 std::vector<std::int32_t> smallest_connected(
-    std::size_t vertices, std::vector<std::array<std::int32_t, n>> const& simplices) {
+    std::size_t vertices, std::span<std::array<std::int32_t, n> const> simplices) {
   std::vector<std::int32_t> parent(vertices);
   std::iota(parent.begin(), parent.end(), 0);
   auto const up = [&](std::int32_t v) -> std::int32_t& { return parent[v]; };
@@ -30,6 +30,11 @@ std::vector<std::int32_t> smallest_connected(
   // A parent is never larger than its child, so that it is a root by now.
   for (std::int32_t& v : parent) v = up(v);
   return parent;
+}
+template <std::size_t n>
+std::vector<std::int32_t> smallest_connected(
+    std::size_t vertices, std::vector<std::array<std::int32_t, n>> const& simplices) {
+  return smallest_connected(vertices, std::span<std::array<std::int32_t, n> const>(simplices));
 }
 
 }  // namespace taut
