@@ -165,7 +165,7 @@ struct MomentumToVelocity {
     Scalar const m = mass(node);
     for (int c = 0; c < 3; ++c) {
       Scalar const v = velocity(node, c) / m;
-      velocity(node, c) = m > 0 && Kokkos::isfinite(v) ? v : Scalar(0);
+      velocity(node, c) = m > 0 ? v : Scalar(0);
     }
     if (!(m > floor)) mass(node) = floor;
   }
@@ -289,7 +289,7 @@ public:
   using Scalar = typename Precision::position;
   using Positions = VectorField<Scalar, Space>;
 
-  /// Of the nodes, the first `nodes` entries.
+  /// Of the nodes.
   Array<Scalar, Space> const& mass() const { return mass_; }
   Positions const& velocity() const { return velocity_; }
 
@@ -303,8 +303,8 @@ public:
   void to_grid(Particles<Precision, Space> const& particles, ParticleBlocks<K, Space> const& blocks,
                int nodes, double dx) {
     auto const& views = blocks.views();
-    grow(mass_, "node_mass", nodes);
-    grow(velocity_, "node_velocity", nodes);
+    mass_ = mass_memory_.resize("node_mass", nodes);
+    velocity_ = velocity_memory_.resize("node_velocity", nodes);
     grow(partial_, "transfer_partial",
          std::size_t(4) * BlockViews<K, Space>::nodes * views.patches);
     if (views.patches > 0) {
@@ -328,6 +328,8 @@ public:
 private:
   Array<Scalar, Space> mass_;
   Positions velocity_;
+  Resizable<Array<Scalar, Space>> mass_memory_;
+  Resizable<Positions> velocity_memory_;
   Kokkos::View<Scalar*, typename Space::memory> partial_;
 };
 

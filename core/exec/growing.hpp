@@ -19,6 +19,31 @@ void grow(View& view, char const* name, std::size_t count) {
       View(Kokkos::view_alloc(Kokkos::WithoutInitializing, std::string(name)), count + count / 2);
 }
 
+/// Memory for a view whose first extent changes from step to step.
+template <class View>
+class Resizable {
+public:
+  /// A view of n entries, by `others` where other extents are not fixed either. Takes new memory,
+  /// which is zero, only if there is less than that; otherwise what is in it has no meaning. Valid
+  /// until the next call, and while this lives.
+  template <class... Others>
+  View resize(char const* name, std::size_t n, Others... others) {
+    std::size_t const needed = View::required_allocation_size(n, std::size_t(others)...);
+    if (needed > capacity_ || memory_.data() == nullptr) {
+      bool const first = capacity_ == 0;
+      memory_ = View();  // the old memory first
+      std::size_t const room = first ? n : n + n / 2;
+      memory_ = View(std::string(name), room, std::size_t(others)...);
+      capacity_ = View::required_allocation_size(room, std::size_t(others)...);
+    }
+    return View(memory_.data(), n, std::size_t(others)...);
+  }
+
+private:
+  View memory_;
+  std::size_t capacity_ = 0;
+};
+
 /// `host` becomes what `view` is copied from and to: `view` itself where the host can reach it.
 template <class View>
 void grow(View& view, typename View::HostMirror& host, char const* name, std::size_t count) {
