@@ -107,14 +107,14 @@ struct BoundaryMotion {
 ///   ball         radius                               cylinder   radius, height (axis y)
 ///   torus        radius of the ring (axis y), of its section
 struct BoundarySpec {
-  std::string name;
+  std::string name = {};
   BoundaryShape shape = BoundaryShape::half_space;
   BoundaryContact contact = BoundaryContact::sticky;
   bool outside = false;
   double friction = 0;
   Vec3<double> size{};
   /// As a function of time, s; empty: at rest at the origin.
-  std::function<BoundaryMotion(double)> motion;
+  std::function<BoundaryMotion(double)> motion = {};
 };
 
 /// A motion that never changes.

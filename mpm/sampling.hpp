@@ -25,8 +25,8 @@ BlueNoise blue_noise(int count, std::uint64_t seed);
 
 /// A body to be made of particles.
 struct ParticleBody {
-  std::string name;
-  Solid solid;
+  std::string name = {};
+  Solid solid = {};
   double density = 1000;    ///< kg/m^3
   double per_cell = 8;      ///< particles in a cell of the grid
   int material = 0;         ///< of the term over the particles
