@@ -19,4 +19,4 @@ configure_package_config_file(cmake/TautConfig.cmake.in "${PROJECT_BINARY_DIR}/T
                               INSTALL_DESTINATION ${package_folder} NO_SET_AND_CHECK_MACRO)
 write_basic_package_version_file("${PROJECT_BINARY_DIR}/TautConfigVersion.cmake" COMPATIBILITY SameMinorVersion)
 install(FILES "${PROJECT_BINARY_DIR}/TautConfig.cmake" "${PROJECT_BINARY_DIR}/TautConfigVersion.cmake"
-        DESTINATION ${package_folder})
+              cmake/TautOpenVDB.cmake DESTINATION ${package_folder})

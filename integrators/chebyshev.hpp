@@ -80,7 +80,7 @@ public:
           params_.rho, params_.delay);
   }
 
-  void resize(int n, bool) { last_step_ = Vectors("last_step", n); }
+  void resize(int n, bool) { last_step_ = memory_.resize("last_step", n); }
 
   void start() {
     rho_ = params_.rho;
@@ -149,6 +149,7 @@ private:
   double marked_ = 0;  ///< g'P g at iteration marked_at_
   int marked_at_ = 0;
   Vectors last_step_;
+  Resizable<Vectors> memory_;
 };
 
 template <class Preconditioner, class LineSearch, class Stopping>

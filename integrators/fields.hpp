@@ -2,6 +2,7 @@
 // compiled once per precision and space. Products are formed and summed in Precision::sum.
 #pragma once
 
+#include <taut/core/exec/growing.hpp>
 #include <taut/core/exec/parallel.hpp>
 #include <taut/core/math/matrix.hpp>
 
@@ -90,18 +91,22 @@ struct DescentFields {
   Reducer<S, typename P::sum> reducer;
 
   int size() const { return static_cast<int>(direction.extent(0)); }
-  /// Allocates what is not there already.
+  /// Allocates what there is no memory for.
   void resize(int n, bool with_origin = false) {
     if (with_origin && static_cast<int>(origin.extent(0)) != n) {
-      origin = VectorField<typename P::position, S>("origin", n);
+      origin = origin_memory_.resize("origin", n);
     }
     if (size() == n) return;
-    gradient = Vectors("gradient", n);
-    gradient_before = Vectors("gradient_before", n);
-    direction = Vectors("direction", n);
-    from = VectorField<typename P::position, S>("from", n);
-    reducer = Reducer<S, typename P::sum>(n);
+    gradient = gradient_memory_.resize("gradient", n);
+    gradient_before = gradient_before_memory_.resize("gradient_before", n);
+    direction = direction_memory_.resize("direction", n);
+    from = from_memory_.resize("from", n);
+    reducer.provide(n);
   }
+
+private:
+  Resizable<Vectors> gradient_memory_, gradient_before_memory_, direction_memory_;
+  Resizable<VectorField<typename P::position, S>> from_memory_, origin_memory_;
 };
 
 }  // namespace taut

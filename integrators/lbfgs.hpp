@@ -146,9 +146,9 @@ public:
   }
 
   void resize(int n, bool) {
-    history_.s = typename History::Slots("lbfgs_s", n, params_.window);
-    history_.y = typename History::Slots("lbfgs_y", n, params_.window);
-    reducer_ = Reducer<S, typename P::sum>(n, Dots::count);
+    history_.s = s_memory_.resize("lbfgs_s", n, params_.window);
+    history_.y = y_memory_.resize("lbfgs_y", n, params_.window);
+    reducer_.provide(n, Dots::count);
   }
 
   void start() { restart(); }
@@ -241,6 +241,7 @@ private:
 
   LbfgsParams params_;
   History history_{{}, {}, 0};
+  Resizable<typename History::Slots> s_memory_, y_memory_;
   int pairs_ = 0, newest_ = -1;
   bool restarted_ = true;
   double slope_ = 0;

@@ -105,11 +105,11 @@ public:
 
   void resize(int n) {
     if (int(r_.extent(0)) == n) return;
-    r_ = Vectors("cg_residual", n);
-    z_ = Vectors("cg_preconditioned", n);
-    d_ = Vectors("cg_direction", n);
-    hd_ = Vectors("cg_product", n);
-    reducer_ = Reducer<S>(n, 2);
+    r_ = memory_[0].resize("cg_residual", n);
+    z_ = memory_[1].resize("cg_preconditioned", n);
+    d_ = memory_[2].resize("cg_direction", n);
+    hd_ = memory_[3].resize("cg_product", n);
+    reducer_.provide(n, 2);
   }
 
   /// `product(d, hd)` makes hd = H d; `preconditioner.apply(r, z)` makes z = P r.
@@ -167,6 +167,7 @@ private:
   }
 
   Vectors r_, z_, d_, hd_;
+  Resizable<Vectors> memory_[4];
   Reducer<S> reducer_;
 };
 

@@ -101,8 +101,8 @@ public:
 
   /// Memory for P g, unless P is pointwise.
   void resize(int n, bool pointwise) {
-    z_ = Vectors("z", pointwise ? 0 : n);
-    z_before_ = Vectors("z_before", pointwise ? 0 : n);
+    z_ = pointwise ? Vectors() : z_memory_.resize("z", n);
+    z_before_ = pointwise ? Vectors() : z_before_memory_.resize("z_before", n);
   }
 
   /// Whether to go by islands (island_descent.hpp).
@@ -192,6 +192,7 @@ private:
   bool restarted_ = true;
   Dots dots_;
   Vectors z_, z_before_;
+  Resizable<Vectors> z_memory_, z_before_memory_;
   Islands<P, S> islands_;
 };
 

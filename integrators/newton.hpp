@@ -132,8 +132,8 @@ public:
       : linear_(linear), forcing_(forcing) {}
 
   void resize(int n) {
-    b_ = VectorField<typename P::real, S>("newton_rhs", n);
-    reducer_ = Reducer<S>(n, Products::count);
+    b_ = b_memory_.resize("newton_rhs", n);
+    reducer_.provide(n, Products::count);
   }
 
   /// A new minimisation, perhaps of another objective.
@@ -189,6 +189,7 @@ private:
   Linear linear_;
   ForcingTerm forcing_;
   VectorField<typename P::real, S> b_;  ///< -g
+  Resizable<VectorField<typename P::real, S>> b_memory_;
   Reducer<S> reducer_;
   bool started_ = false;
   int linear_iterations_ = 0, linear_failures_ = 0;

@@ -162,7 +162,7 @@ public:
   Jacobi() : Jacobi(Params()) {}
   explicit Jacobi(Params const& params) : params_(params) {}
   Refresh refresh() const { return params_.refresh; }
-  void resize(int n) { diagonal() = VectorField<typename P::real, S>("jacobi", n); }
+  void resize(int n) { diagonal() = memory_.resize("jacobi", n); }
   template <class E>
   void update(E& e, VectorField<typename P::position, S> const&) {
     auto const floor = this->floor_without_inertia(e, diagonal(), params_.floor);
@@ -172,6 +172,7 @@ public:
 private:
   VectorField<typename P::real, S>& diagonal() { return this->local_.diagonal; }
   Params params_;
+  Resizable<VectorField<typename P::real, S>> memory_;
 };
 
 /// P = inverses of the diagonal 3x3 blocks of H, with the eigenvalues of each raised to `floor`
@@ -188,7 +189,7 @@ public:
   BlockJacobi() : BlockJacobi(Params()) {}
   explicit BlockJacobi(Params const& params) : params_(params) {}
   Refresh refresh() const { return params_.refresh; }
-  void resize(int n) { blocks() = BlockField<typename P::real, S>("block_jacobi", n); }
+  void resize(int n) { blocks() = memory_.resize("block_jacobi", n); }
   template <class E>
   void update(E& e, VectorField<typename P::position, S> const&) {
     auto const floor = this->floor_without_inertia(e, blocks(), params_.floor);
@@ -199,6 +200,7 @@ public:
 private:
   BlockField<typename P::real, S>& blocks() { return this->local_.blocks; }
   Params params_;
+  Resizable<BlockField<typename P::real, S>> memory_;
 };
 
 }  // namespace taut

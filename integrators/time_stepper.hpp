@@ -17,6 +17,7 @@
 // motion through its iterations.
 #pragma once
 
+#include <taut/core/exec/growing.hpp>
 #include <taut/core/exec/parallel.hpp>
 #include <taut/core/potential/local_terms.hpp>
 #include <taut/core/potential/objective.hpp>
@@ -169,6 +170,8 @@ public:
   using Space = typename Minimiser::Space;
   using Positions = VectorField<typename Precision::position, Space>;
   using Params = typename Minimiser::Params;
+  using StateType = State<Precision, Space>;
+  static constexpr bool multistep = Rule::multistep;
 
   TimeStepper() = default;
   /// Throws Error unless there is at least one pass, and where sleep makes no sense.
@@ -205,8 +208,8 @@ private:
     int const n = state.size();
     StepCoefficients const r = R::coefficients(R::multistep ? h / state.last_step : 1);
     if (static_cast<int>(x_.extent(0)) != n) {
-      x_ = Positions("step_x", n);
-      direction_ = VectorField<typename Precision::real, Space>("step_direction", n);
+      x_ = x_memory_.resize("step_x", n);
+      direction_ = direction_memory_.resize("step_direction", n);
     }
     auto& inertia = potential.template term<Inertia<Precision, Space>>();
     inertia.switch_on(R::inertia);
@@ -255,6 +258,8 @@ private:
   Sleep<Precision, Space> sleep_;
   Positions x_;
   VectorField<typename Precision::real, Space> direction_;
+  Resizable<Positions> x_memory_;
+  Resizable<VectorField<typename Precision::real, Space>> direction_memory_;
 };
 
 template <class Minimiser>

@@ -5,6 +5,7 @@
 //   diagonal(s, b)   the three diagonal entries for a vertex with dF = u b^T
 //   block(s, b)      its symmetric 3x3 block
 //   quadratic(s, dF) dF : H : dF
+//   at(s)            diagonal(b) and block(b) of many b, for what has more vertices than a tet
 //
 // per unit volume; T may be a pack of elements.
 #pragma once
@@ -32,10 +33,29 @@ KOKKOS_FORCEINLINE_FUNCTION void keep_squares(IsotropicState<Model, T>& s) {
 }
 }  // namespace kernels
 
+/// The filtered curvature of one state as a function of b: where a filter has nothing to compute
+/// that does not depend on b. The state must outlive it.
+template <class Filter, class Model, class T>
+struct CurvatureAt {
+  IsotropicState<Model, T> const& state;
+
+  KOKKOS_FORCEINLINE_FUNCTION Vec3<T> diagonal(Vec3<T> const& b) const {
+    return Filter::template diagonal<Model>(state, b);
+  }
+  KOKKOS_FORCEINLINE_FUNCTION Sym3<T> block(Vec3<T> const& b) const {
+    return Filter::template block<Model>(state, b);
+  }
+};
+
 /// The paper's: each of the twelve diagonal entries and the scalar dF:H:dF are cut off at zero.
 struct ClampElement {
   static constexpr char const* name = "clamp";
 
+  template <class Model, class T>
+  KOKKOS_FORCEINLINE_FUNCTION static CurvatureAt<ClampElement, Model, T> at(
+      IsotropicState<Model, T> const& s) {
+    return {s};
+  }
   template <class Model, class T>
   KOKKOS_FORCEINLINE_FUNCTION static Vec3<T> diagonal(IsotropicState<Model, T> const& s,
                                                       Vec3<T> const& b) {
@@ -69,6 +89,11 @@ struct ClampElement {
 struct LimitLambda {
   static constexpr char const* name = "limit_lambda";
 
+  template <class Model, class T>
+  KOKKOS_FORCEINLINE_FUNCTION static CurvatureAt<LimitLambda, Model, T> at(
+      IsotropicState<Model, T> const& s) {
+    return {s};
+  }
   template <class Model, class T>
   KOKKOS_FORCEINLINE_FUNCTION static Vec3<T> diagonal(IsotropicState<Model, T> const& s,
                                                       Vec3<T> const& b) {
@@ -114,19 +139,33 @@ private:
 struct FullProjection {
   static constexpr char const* name = "projection";
 
+  template <class T>
+  struct At {
+    SingularFrame<T> frame;
+
+    KOKKOS_FORCEINLINE_FUNCTION Vec3<T> diagonal(Vec3<T> const& b) const {
+      Sym3<T> const h = block(b);
+      return {h.s[0], h.s[1], h.s[2]};
+    }
+    KOKKOS_FORCEINLINE_FUNCTION Sym3<T> block(Vec3<T> const& b) const {
+      Vec3<T> const beta = transpose_times(frame.V, b);
+      Mat3<T> const h = frame.vertex_pair(beta, beta);
+      return {{h(0, 0), h(1, 1), h(2, 2), h(0, 1), h(1, 2), h(0, 2)}};
+    }
+  };
+  template <class Model, class T>
+  KOKKOS_FORCEINLINE_FUNCTION static At<T> at(IsotropicState<Model, T> const& s) {
+    return {singular_frame<Model>(s)};
+  }
   template <class Model, class T>
   KOKKOS_FORCEINLINE_FUNCTION static Vec3<T> diagonal(IsotropicState<Model, T> const& s,
                                                       Vec3<T> const& b) {
-    Sym3<T> const h = block<Model>(s, b);
-    return {h.s[0], h.s[1], h.s[2]};
+    return at<Model>(s).diagonal(b);
   }
   template <class Model, class T>
   KOKKOS_FORCEINLINE_FUNCTION static Sym3<T> block(IsotropicState<Model, T> const& s,
                                                    Vec3<T> const& b) {
-    SingularFrame<T> const frame = singular_frame<Model>(s);
-    Vec3<T> const beta = transpose_times(frame.V, b);
-    Mat3<T> const h = frame.vertex_pair(beta, beta);
-    return {{h(0, 0), h(1, 1), h(2, 2), h(0, 1), h(1, 2), h(0, 2)}};
+    return at<Model>(s).block(b);
   }
   template <class Model, class T>
   KOKKOS_FORCEINLINE_FUNCTION static T quadratic(IsotropicState<Model, T> const& s,

@@ -63,6 +63,11 @@ struct Elastic {
   KOKKOS_FORCEINLINE_FUNCTION static Sym3<T> block(State<T> const& s, Vec3<T> const& b) {
     return Filter::template block<Model>(s, b);
   }
+  /// The same of many b: `.diagonal(b)` and `.block(b)`. The state must outlive it.
+  template <class T>
+  KOKKOS_FORCEINLINE_FUNCTION static auto curvature(State<T> const& s) {
+    return Filter::template at<Model>(s);
+  }
   /// Filtered dF : H : dF.
   template <class T>
   KOKKOS_FORCEINLINE_FUNCTION static T quadratic(State<T> const& s, Mat3<T> const& dF) {

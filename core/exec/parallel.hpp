@@ -151,6 +151,14 @@ public:
     return Reducer(count * run_length, max_sums);
   }
 
+  /// Makes room for as many, if there is not.
+  void provide(int max_terms, int max_sums = 8) {
+    if (max_terms_ >= max_terms && max_sums_ >= max_sums) return;
+    bool const first = max_terms_ == 0;
+    *this = Reducer();  // the old memory first
+    *this = Reducer(first ? max_terms : max_terms + max_terms / 2, max_sums);
+  }
+
   /// `functor(i, Sums<T, K>& sums)` adds the terms of iteration i. Throws Error if there are more
   /// terms or sums than the scratch memory was made for.
   template <int K, class Functor>

@@ -2,6 +2,7 @@
 // cost is one pass over the unknowns.
 #pragma once
 
+#include <taut/core/exec/growing.hpp>
 #include <taut/core/potential/term.hpp>
 #include <taut/core/potential/unknowns.hpp>
 
@@ -40,9 +41,13 @@ public:
     }
   };
 
-  explicit Inertia(Unknowns<Precision, Space> const& unknowns)
-      : mass_(unknowns.mass), target_("inertia_target", unknowns.size()) {}
+  explicit Inertia(Unknowns<Precision, Space> const& unknowns) { resize(unknowns); }
 
+  /// The unknowns have become others, perhaps more or fewer; so have their targets.
+  void resize(Unknowns<Precision, Space> const& unknowns) {
+    mass_ = unknowns.mass;
+    target_ = memory_.resize("inertia_target", unknowns.size());
+  }
   Kernel kernel(double) const { return {mass_, target_, on_ ? 1.0 : 0.0}; }
 
   /// x~, filled by the time integrator; inertia is off in a quasi-static solve.
@@ -52,6 +57,7 @@ public:
 private:
   Array<typename Precision::real, Space> mass_;
   Positions target_;
+  Resizable<Positions> memory_;
   bool on_ = true;
 };
 
@@ -90,6 +96,11 @@ public:
                      Vec3<double> const& acceleration = {0, 0, 0})
       : mass_(unknowns.mass), acceleration_(acceleration) {}
 
+  /// The unknowns have become others: forces on single ones are gone.
+  void resize(Unknowns<Precision, Space> const& unknowns) {
+    mass_ = unknowns.mass;
+    force_ = Forces();
+  }
   Kernel kernel(double scale) const { return {mass_, force_, acceleration_, scale}; }
 
   void set_acceleration(Vec3<double> const& acceleration) { acceleration_ = acceleration; }

@@ -6,6 +6,7 @@
 // A term that is not named does not exist in any loop. h^2 is applied here and nowhere else.
 #pragma once
 
+#include <taut/core/exec/growing.hpp>
 #include <taut/core/exec/parallel.hpp>
 #include <taut/core/potential/local_terms.hpp>
 #include <taut/core/potential/objective.hpp>
@@ -279,11 +280,24 @@ public:
                 "(core/potential/term.hpp)");
 
   explicit Potential(Unknowns<Precision, Space> const& unknowns, Terms... terms)
-      : unknowns_(unknowns),
-        terms_(std::move(terms)...),
-        direction_("prescribed_direction", unknowns.size()),
-        reducer_(unknowns.size(), 1),
-        mass_reducer_(unknowns.size(), 1) {}
+      : unknowns_(unknowns), terms_(std::move(terms)...) {
+    make_room();
+  }
+
+  /// The unknowns have become others (a grid that is made anew each step), perhaps more or fewer.
+  /// Terms that can follow are told; allocates only if there have never been as many.
+  void resize(Unknowns<Precision, Space> const& unknowns) {
+    unknowns_ = unknowns;
+    make_room();
+    for_each_term([&](auto& term) {
+      if constexpr (requires { term.resize(unknowns); }) term.resize(unknowns);
+    });
+  }
+  /// Calls visit(term) for each term.
+  template <class Visit>
+  void for_each_term(Visit const& visit) {
+    std::apply([&](auto&... term) { (visit(term), ...); }, terms_);
+  }
 
   /// The time integrator says what the step is: where it starts, the factor of all energies but the
   /// inertia (h^2 for implicit Euler), and the step that turns errors of position into errors of
@@ -523,6 +537,11 @@ public:
   }
 
 private:
+  void make_room() {
+    direction_ = direction_memory_.resize("prescribed_direction", size());
+    reducer_.provide(size(), 1);
+    mass_reducer_.provide(size(), 1);
+  }
   /// The chained kernels of all local terms.
   auto locals() const {
     return std::apply(
@@ -590,8 +609,8 @@ private:
 
   Array<Real, Space> stiffness_of_untold(Positions const& x) {
     if (stiffness_.extent_int(0) != size()) {
-      stiffness_ = Array<Real, Space>("stiffness", size());
-      diagonal_ = Vectors("stiffness_diagonal", size());
+      stiffness_ = stiffness_memory_.resize("stiffness", size());
+      diagonal_ = diagonal_memory_.resize("stiffness_diagonal", size());
     }
     local_gradient<3>(x, direction_, diagonal_);
     for_each_of<is_untold>([&](auto const& term) {
@@ -662,6 +681,8 @@ private:
   Vectors direction_;
   Array<Real, Space> stiffness_;  ///< where terms are told of it
   Vectors diagonal_;
+  Resizable<Vectors> direction_memory_, diagonal_memory_;
+  Resizable<Array<Real, Space>> stiffness_memory_;
   Reducer<Space, typename Precision::sum> reducer_;
   Reducer<Space, double> mass_reducer_;
   double scale_ = 1;

@@ -1,0 +1,331 @@
+// Elastic energy of material points, V(x) = Sum_p V_p Psi(F_p(x)), as a function of the displaced
+// places of the nodes of a grid: a swept term of the potential, for any material that tets take.
+//
+// The grid, and which particle sees which node, change from step to step: `update` before each.
+// Copies share nothing that changes within a step, so a Potential made after `update` may hold one.
+#pragma once
+
+#include <taut/core/fem/element_material.hpp>
+#include <taut/core/potential/term.hpp>
+#include <taut/core/report/error.hpp>
+#include <taut/mpm/particle_matrix_kernels.hpp>
+#include <taut/mpm/particles.hpp>
+
+namespace taut {
+
+namespace kernels {
+
+/// Writes what sweeps read of the particles.
+template <class S, class Precision, Spline K>
+struct PreparePoints {
+  using Real = typename Precision::real;
+  BlockViews<K, S> blocks;
+  Particles<Precision, S> particles;
+  double per_dx;
+  Kokkos::View<Real*, typename S::memory> data;
+
+  KOKKOS_FUNCTION void operator()(int slot) const {
+    constexpr int lanes = BlockSweep<S, Real, K, false>::lanes;
+    int const p = blocks.particle(slot);
+    Real* const to = data.data() + std::size_t(slot / lanes) * point_numbers * lanes + slot % lanes;
+    for (int c = 0; c < 3; ++c) {
+      double const x = p >= 0 ? double(particles.x(p, c)) * per_dx : K::start + 0.5;
+      to[c * lanes] = static_cast<Real>((x - base_node<K>(x)) - K::start);
+    }
+    for (int k = 0; k < 9; ++k) {
+      to[(3 + k) * lanes] = p >= 0 ? static_cast<Real>(particles.F(p, k)) : Real(k % 4 == 0);
+    }
+    to[12 * lanes] =
+        p >= 0 ? static_cast<Real>(double(particles.volume(p)) * double(particles.stiffness(p)))
+               : Real(0);
+  }
+};
+
+template <Spline K, class S>
+struct ColourOfBlock {
+  BlockViews<K, S> blocks;
+  Kokkos::View<int*, typename S::memory> colour;
+  KOKKOS_FUNCTION void operator()(int block) const {
+    int parity = 0;
+    for (int c = 0; c < 3; ++c) {
+      parity = 2 * parity + (blocks.origin(block, c) / BlockViews<K, S>::cells & 1);
+    }
+    colour(block) = parity;
+  }
+};
+
+/// The nodes that the particles of each cell see.
+template <Spline K, class S>
+struct NodesOfCells {
+  GridNodes<S> grid;
+  Kokkos::View<int* [3], typename S::layout, typename S::memory> base;
+  Kokkos::View<int*, typename S::memory> node;
+  KOKKOS_FUNCTION void operator()(int n) const {
+    constexpr int width = K::width, stencil = width * width * width;
+    int const cell = n / stencil, k = n % stencil;
+    node(n) = grid.node(base(cell, 0) + k / (width * width), base(cell, 1) + k / width % width,
+                        base(cell, 2) + k % width);
+  }
+};
+
+/// Adds the rows of a node to the fields of a potential.
+template <class S, class Real>
+struct AddToFields {
+  SweepOutput<S, Real> output;
+  template <int numbers>
+  KOKKOS_FORCEINLINE_FUNCTION void add(int node, Real const (&sum)[numbers]) const {
+    output.template add<numbers>(node, sum);
+  }
+};
+
+}  // namespace kernels
+
+/// `packed_`: a thread per patch, which computes SIMD packs (on the host), or a team of threads
+/// with a particle each (on a device). Both run on the host, which the tests use.
+template <ElementMaterial Material, Spline K = QuadraticSpline, class Precision_ = Mixed,
+          class Space_ = DefaultSpace, bool packed_ = Space_::on_host>
+class ElasticParticles {
+public:
+  using Space = Space_;
+  using Precision = Precision_;
+  using Kernel = K;
+  using Real = typename Precision::real;
+  using Positions = VectorField<typename Precision::position, Space>;
+  using Vectors = VectorField<Real, Space>;
+  using Blocks = BlockField<Real, Space>;
+  using Matrix = BlockCsr<Space, double>;
+  using MaterialParameters = typename Material::template Parameters<double>;
+  /// What ParticleBlocks are to be padded to.
+  static constexpr int lanes = kernels::BlockSweep<Space, Real, K, packed_>::lanes;
+
+  /// `team_size`: threads per patch where not packed; 0: one on the host, 64 on a device. Throws
+  /// Error if there is no material.
+  explicit ElasticParticles(std::vector<MaterialParameters> const& materials, int team_size = 0)
+      : materials_(to_space(materials)), team_size_(packed_ ? 1 : team_size) {
+    if (materials.empty()) throw Error("ElasticParticles: no materials; give one or more");
+    if (team_size_ == 0) team_size_ = Space::on_host ? 1 : 64;
+  }
+
+  int material_count() const { return static_cast<int>(materials_.extent(0)); }
+
+  /// A new step begins: `blocks` are sorted by where `particles` are and bound to `grid`, whose
+  /// nodes lie at `rest` (m).
+  void update(Particles<Precision, Space> const& particles, ParticleBlocks<K, Space> const& blocks,
+              GridNodes<Space> const& grid, Positions const& rest) {
+    blocks_ = blocks.views();
+    grid_ = grid;
+    cells_ = blocks.cells();
+    cell_count_ = blocks.cell_count();
+    rest_ = rest;
+    dx_ = grid.dx;
+    ++version_;
+    int const slots = (blocks_.slots + lanes - 1) / lanes * lanes;
+    grow(data_, "particle_data", std::size_t(kernels::point_numbers) * slots);
+    for_each<Space>(
+        "prepare_points", blocks_.slots,
+        kernels::PreparePoints<Space, Precision, K>{blocks_, particles, 1 / dx_, data_});
+    if (reducible_ < blocks_.patches) {
+      reducible_ = blocks_.patches + blocks_.patches / 2;
+      reducer_ = Reducer<Space, Sum>::of_partials(reducible_);
+    }
+    grow(bounds_, "particle_bounds", blocks_.patches);
+  }
+
+  double value(Positions const& x, double scale) const {
+    return scale * measured<kernels::Measure::energy>("particle_energy", x, Vectors(), 0);
+  }
+  double change(Positions const& x, Vectors const& p, double alpha, double scale) const {
+    return scale * measured<kernels::Measure::change>("particle_change", x, p, alpha);
+  }
+  double quadratic_form(Positions const& x, Vectors const& p, double scale) const {
+    return scale * measured<kernels::Measure::form>("particle_quadratic_form", x, p, 0);
+  }
+  /// Lowers `certified` to a length that inverts no particle, where the material forbids that.
+  double quadratic_form(Positions const& x, Vectors const& p, double scale,
+                        double& certified) const {
+    double const form = quadratic_form(x, p, scale);
+    if constexpr (!Material::allows_inversion) certified = smallest_bound(certified);
+    return form;
+  }
+
+  void add_gradient(Positions const& x, double scale, FixedMask<Space> const& fixed,
+                    Vectors const& g) const {
+    sweep(x, nullptr, 0, scale, {{}, fixed, g, {}, {}});
+  }
+  void add_gradient(Positions const& x, double scale, FixedMask<Space> const& fixed,
+                    Vectors const& g, Vectors const& diagonal) const {
+    sweep(x, nullptr, 0, scale, {{}, fixed, g, diagonal, {}});
+  }
+  void add_gradient(Positions const& x, double scale, FixedMask<Space> const& fixed,
+                    Vectors const& g, Blocks const& blocks) const {
+    sweep(x, nullptr, 0, scale, {{}, fixed, g, {}, blocks});
+  }
+  double add_gradient_after(Positions const& x, Vectors const& p, double alpha, double scale,
+                            FixedMask<Space> const& fixed, Vectors const& g) const {
+    return sweep(x, &p, alpha, scale, {{}, fixed, g, {}, {}});
+  }
+  double add_gradient_after(Positions const& x, Vectors const& p, double alpha, double scale,
+                            FixedMask<Space> const& fixed, Vectors const& g,
+                            Vectors const& diagonal) const {
+    return sweep(x, &p, alpha, scale, {{}, fixed, g, diagonal, {}});
+  }
+  double add_gradient_after(Positions const& x, Vectors const& p, double alpha, double scale,
+                            FixedMask<Space> const& fixed, Vectors const& g,
+                            Blocks const& blocks) const {
+    return sweep(x, &p, alpha, scale, {{}, fixed, g, {}, blocks});
+  }
+
+  void add_product(Positions const& x, Vectors const& p, double scale,
+                   FixedMask<Space> const& fixed, Vectors const& hp) const {
+    provide_partial(fixed, 3);
+    using Kernel_ = kernels::ParticleProduct<Space, Precision, Material, K, packed_>;
+    run("particle_product", Kernel_{frame(x), p, static_cast<Real>(scale), partial_});
+    gather<3>({{}, fixed, hp, {}, {}});
+  }
+  /// Block by block and colour after colour; a block matrix of 125 (343) columns a row.
+  void add_to(Matrix const& matrix, Positions const& x, double scale,
+              FixedMask<Space> const& fixed) const;
+
+  double max_step(Positions const& x, Vectors const& p, double at_most) const {
+    if constexpr (Material::allows_inversion) {
+      return at_most;
+    } else {
+      return step_to_inversion(x, p, at_most, true);
+    }
+  }
+  double max_step(Positions const& x, Vectors const& p, double at_most, double certified) const {
+    return at_most <= certified ? at_most : max_step(x, p, at_most);
+  }
+  double max_prescribed_step(Positions const& x, Vectors const& p, double at_most) const {
+    return step_to_inversion(x, p, at_most, !Material::allows_inversion);
+  }
+
+  /// The nodes of one cell are one element.
+  void elements(std::vector<Connectivity>& kinds) const;
+  std::int64_t pattern_version(Positions const&) const { return version_; }
+
+private:
+  using Sum = typename Precision::sum;
+  using Output = kernels::SweepOutput<Space, Real>;
+  template <class T>
+  using List = Kokkos::View<T*, typename Space::memory>;
+  static constexpr int stencil = K::width * K::width * K::width;
+
+  static List<MaterialParameters const> to_space(std::vector<MaterialParameters> const& list) {
+    List<MaterialParameters> const view("materials", list.size());
+    auto const host = Kokkos::create_mirror_view(view);
+    for (std::size_t k = 0; k < list.size(); ++k) host(k) = list[k];
+    Kokkos::deep_copy(view, host);
+    return view;
+  }
+
+  kernels::ParticleSweep<Space, Precision, Material, K, packed_> frame(Positions const& x) const {
+    return {{blocks_}, data_, materials_, {x, rest_}, static_cast<Real>(dx_)};
+  }
+  template <class Kernel_>
+  void run(char const* name, Kernel_ const& kernel) const {
+    if (blocks_.patches == 0) return;
+    typename Space::team_policy policy(Space::instance(), blocks_.patches, team_size_);
+    policy.set_scratch_size(0, Kokkos::PerTeam(static_cast<int>(kernel.scratch_bytes())));
+    Kokkos::parallel_for(label(name), policy, kernel);
+  }
+  template <kernels::Measure what>
+  double measured(char const* name, Positions const& x, Vectors const& p, double alpha) const {
+    using Kernel_ = kernels::ParticleMeasure<Space, Precision, Material, K, packed_, what>;
+    run(name, Kernel_{frame(x), p, static_cast<Real>(alpha), reducer_.partials(), bounds_});
+    return reducer_.template finish<1>(name, blocks_.patches)[0];
+  }
+  double sweep(Positions const& x, Vectors const* p, double alpha, double scale,
+               Output const& to) const;
+  double step_to_inversion(Positions const& x, Vectors const& p, double at_most,
+                           bool strict) const {
+    using Kernel_ = kernels::ParticleInversion<Space, Precision, Material, K, packed_>;
+    run("particle_max_step", Kernel_{frame(x), p, at_most, strict, bounds_});
+    return smallest_bound(at_most);
+  }
+  double smallest_bound(double ceiling) const {
+    return minimum<Space>("particle_bound", blocks_.patches, ceiling,
+                          kernels::SmallestOf<Space>{bounds_});
+  }
+  void provide_partial(FixedMask<Space> const& fixed, int numbers) const {
+    if (fixed.extent_int(0) != grid_.count)
+      throw Error("ElasticParticles: the grid has {} nodes, the potential {} unknowns", grid_.count,
+                  fixed.extent(0));
+    grow(partial_, "particle_partial",
+         std::size_t(numbers) * BlockViews<K, Space>::nodes * blocks_.patches);
+  }
+  template <int numbers>
+  void gather(Output const& to) const {
+    using Add = kernels::AddToFields<Space, Real>;
+    for_each<Space>("particle_gather", grid_.count,
+                    kernels::GatherRows<Space, Real, K, numbers, Add>{blocks_, partial_, {to}});
+  }
+
+  List<MaterialParameters const> materials_;
+  int team_size_;
+  BlockViews<K, Space> blocks_;
+  GridNodes<Space> grid_;
+  typename ParticleBlocks<K, Space>::Cells cells_;
+  int cell_count_ = 0, reducible_ = 0;
+  Positions rest_;
+  double dx_ = 1;
+  std::int64_t version_ = 0;
+  List<Real> data_;
+  Reducer<Space, Sum> reducer_;
+  mutable List<Real> partial_;
+  List<double> bounds_;  ///< what the sweep of the moment says of each patch
+  mutable std::vector<int> cell_nodes_;
+};
+
+template <ElementMaterial Material, Spline K, class Precision, class Space, bool packed>
+double ElasticParticles<Material, K, Precision, Space, packed>::sweep(Positions const& x,
+                                                                      Vectors const* p,
+                                                                      double alpha, double scale,
+                                                                      Output const& to) const {
+  using kernels::Curvature;
+  Curvature const curvature = to.blocks.extent(0) > 0     ? Curvature::blocks
+                              : to.diagonal.extent(0) > 0 ? Curvature::diagonal
+                                                          : Curvature::none;
+  provide_partial(to.fixed, 3 + static_cast<int>(curvature));
+  using Kernel_ = kernels::ParticleGradient<Space, Precision, Material, K, packed>;
+  run("particle_gradient",
+      Kernel_{frame(x), curvature, p != nullptr, p ? *p : Vectors(), static_cast<Real>(alpha),
+              static_cast<Real>(scale), partial_, reducer_.partials()});
+  if (curvature == Curvature::none) gather<3>(to);
+  if (curvature == Curvature::diagonal) gather<6>(to);
+  if (curvature == Curvature::blocks) gather<9>(to);
+  if (!p) return 0;
+  return reducer_.template finish<1>("particle_change", blocks_.patches)[0];
+}
+
+template <ElementMaterial Material, Spline K, class Precision, class Space, bool packed>
+void ElasticParticles<Material, K, Precision, Space, packed>::add_to(
+    Matrix const& matrix, Positions const& x, double scale, FixedMask<Space> const& fixed) const {
+  constexpr int colours = 8;
+  List<int> const colour("block_colour", blocks_.blocks), begin("colour_begin", colours + 1),
+      order("colour_order", blocks_.blocks);
+  for_each<Space>("block_colour", blocks_.blocks,
+                  kernels::ColourOfBlock<K, Space>{blocks_, colour});
+  BucketSort<Space>(blocks_.blocks).sort(blocks_.blocks, colour, colours, begin, order);
+  auto const first = Kokkos::create_mirror_view_and_copy(Kokkos::HostSpace(), begin);
+  for (int c = 0; c < colours; ++c) {
+    using Kernel_ = kernels::AssembleBlocks<Space, Precision, Material, K, Matrix>;
+    for_each<Space>(
+        "particle_assemble", first(c + 1) - first(c),
+        Kernel_{
+            {blocks_, data_}, materials_, order, first(c), {x, rest_}, fixed, matrix, dx_, scale});
+  }
+}
+
+template <ElementMaterial Material, Spline K, class Precision, class Space, bool packed>
+void ElasticParticles<Material, K, Precision, Space, packed>::elements(
+    std::vector<Connectivity>& kinds) const {
+  int const n = stencil * cell_count_;
+  List<int> const node("cell_nodes", n);
+  for_each<Space>("cell_nodes", n, kernels::NodesOfCells<K, Space>{grid_, cells_, node});
+  auto const host = Kokkos::create_mirror_view_and_copy(Kokkos::HostSpace(), node);
+  cell_nodes_.assign(host.data(), host.data() + n);
+  kinds.push_back({cell_nodes_, stencil});
+}
+
+}  // namespace taut

@@ -1,0 +1,171 @@
+// A step of the material point method, implicit Euler over the velocities of the nodes of a grid:
+//
+//   sort particles, make the grid, bring mass and momentum to it;
+//   x = argmin 1/2 |x - (X + h v)|^2_M + h^2 (V_1(x) + ...),  a time step as meshes take it, from
+//     the nodes at rest;
+//   bring velocities back, F <- (I + grad (x - X)) F, return map, move the particles.
+//
+// (Jiang et al. 2016; Wang et al. 2020.) The grid is forgotten after the step. A step in which a
+// particle would go farther than its bound, or that does not end in numbers, is taken back and
+// tried with half the time.
+#pragma once
+
+#include <taut/mpm/particle_grid.hpp>
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <utility>
+
+namespace taut {
+
+struct ParticleStepParams {
+  double cfl = 0.6;       ///< cells that the fastest particle goes in a step of cfl_step()
+  double crossing = 1;    ///< cells that a particle may go at most
+  int max_halvings = 10;  ///< of a step, before it is given up
+};
+
+/// What a step did: the minimiser's report, and the rest.
+template <class Report>
+struct ParticleStepReport {
+  Report minimiser;
+  double time_step = 0;  ///< taken, s
+  int halvings = 0;      ///< of the step that was asked for
+  int nodes = 0, patches = 0;
+  double travel_cells = 0;  ///< bound of how far a particle went, cells
+};
+
+/// `Stepper` takes a time step of the nodes: TimeStepper over any minimiser.
+template <class Stepper, Spline K = QuadraticSpline, Transfer T = Apic, Flow F = NoFlow>
+class ParticleStepper {
+  static_assert(!Stepper::multistep,
+                "taut: particles are stepped by one-step rules (ImplicitEuler): their grid has no "
+                "past");
+
+public:
+  using Precision = typename Stepper::Precision;
+  using Space = typename Stepper::Space;
+  using Positions = VectorField<typename Precision::position, Space>;
+  using Grid = ParticleGrid<K, Precision, Space>;
+
+  explicit ParticleStepper(Stepper stepper = Stepper(), ParticleStepParams const& params = {},
+                           T const& transfer = {}, F const& flow = {})
+      : stepper_(std::move(stepper)), params_(params), transfer_(transfer), flow_(flow) {
+    if (!(params.cfl > 0) || !(params.crossing > 0) || params.max_halvings < 0) {
+      throw Error(
+          "particle stepper: cfl = {}, crossing = {}, max_halvings = {}; give cells above 0 "
+          "and 0 or more halvings",
+          params.cfl, params.crossing, params.max_halvings);
+    }
+  }
+
+  /// Seconds in which the fastest particle goes `cfl` cells, at most `longest`.
+  double cfl_step(Particles<Precision, Space> const& particles, double dx, double longest) const {
+    double const speed = fastest(particles);
+    return speed * longest > params_.cfl * dx ? params_.cfl * dx / speed : longest;
+  }
+
+  /// Advances particles by h seconds, or by the part of it that the report says. `scene` is a
+  /// Potential over grid.unknowns() with terms over particles; `boundaries` are where they are h
+  /// seconds later than `time`. Throws Error if h is not above 0, if a particle is nowhere, or if
+  /// no part of the step can be taken, and leaves the particles as they were.
+  template <class Potential>
+  auto step(Potential& scene, Grid& grid, Particles<Precision, Space> const& particles, double h,
+            BoundaryList<Space>& boundaries, double time = 0) {
+    if (!(h > 0) || !std::isfinite(h)) throw Error("a step of {} s; give one above 0", h);
+    int materials = std::numeric_limits<int>::max();
+    scene.for_each_term([&](auto const& term) {
+      if constexpr (requires { term.material_count(); }) {
+        materials = std::min(materials, term.material_count());
+      }
+    });
+    if (materials == std::numeric_limits<int>::max()) materials = 1;
+    grid.rebuild(particles, materials);
+    scene.resize(grid.unknowns());
+    scene.for_each_term([&](auto& term) {
+      if constexpr (requires {
+                      term.update(particles, grid.blocks(), grid.nodes(), grid.rest());
+                    }) {
+        term.update(particles, grid.blocks(), grid.nodes(), grid.rest());
+      }
+    });
+
+    using Report = decltype(stepper_.step(scene, state_, h));
+    ParticleStepReport<Report> report;
+    report.nodes = grid.size();
+    report.patches = grid.blocks().views().patches;
+    if (grid.size() == 0) {
+      report.time_step = h;
+      return report;
+    }
+    for (;; h /= 2, ++report.halvings) {
+      boundaries.set_time(time + h);
+      grid.fix(boundaries, h);
+      scene.for_each_term([&](auto& term) {
+        if constexpr (requires { term.hold(grid.rest(), boundaries, h); }) {
+          term.hold(grid.rest(), boundaries, h);
+        }
+      });
+      start(grid);
+      report.minimiser = stepper_.step(scene, state_, h);
+      bool const finite = report.minimiser.stop != decltype(report.minimiser.stop)::non_finite;
+      double const allowed = params_.crossing * grid.dx();
+      double travel = std::numeric_limits<double>::infinity();
+      if (finite) travel = travelled(grid, particles, allowed);
+      report.travel_cells = travel / grid.dx();
+      if (travel <= allowed) break;
+      if (report.halvings >= params_.max_halvings) {
+        throw Error(
+            "a step of particles was halved {} times, to {} s, and one would still go {} cells: "
+            "{}; soften the impact, or allow more crossing",
+            report.halvings, h, report.travel_cells,
+            finite ? "it is pushed too hard" : "the minimisation ends in no numbers");
+      }
+    }
+    report.time_step = h;
+    to_particles<K>(particles, grid.blocks(), state_.x, grid.rest(), state_.v, grid.velocity(), h,
+                    grid.dx(), transfer_, flow_);
+    Space::instance().fence("taut: particle step");
+    return report;
+  }
+  template <class Potential>
+  auto step(Potential& scene, Grid& grid, Particles<Precision, Space> const& particles, double h) {
+    BoundaryList<Space> none;
+    return step(scene, grid, particles, h, none);
+  }
+
+  Stepper& stepper() { return stepper_; }
+  /// The nodes where the last step ended.
+  typename Stepper::StateType const& nodes() const { return state_; }
+
+private:
+  /// The nodes at rest, with the velocities of the particles.
+  void start(Grid const& grid) {
+    int const n = grid.size();
+    state_.x = memory_[0].resize("node_x", n);
+    state_.v = memory_[1].resize("node_v", n);
+    state_.x_last = memory_[2].resize("node_x_last", n);
+    state_.v_last = memory_[3].resize("node_v_last", n);
+    Kokkos::deep_copy(Space::instance(), state_.x, grid.rest());
+    Kokkos::deep_copy(Space::instance(), state_.v, grid.velocity());
+    state_.last_step = 0;
+  }
+  /// A bound of how far a particle goes: nodes tell soon; if one goes too far, particles are asked.
+  double travelled(Grid const& grid, Particles<Precision, Space> const& particles,
+                   double allowed) const {
+    double const node = maximum<Space>(
+        "node_travel", grid.size(), 0.0,
+        kernels::NodeTravel<Space, typename Precision::position>{state_.x, grid.rest()});
+    if (node <= allowed) return node;
+    return farthest_travel<K>(particles, grid.blocks(), state_.x, grid.rest(), grid.dx());
+  }
+
+  Stepper stepper_;
+  ParticleStepParams params_;
+  T transfer_;
+  F flow_;
+  typename Stepper::StateType state_;
+  Resizable<Positions> memory_[4];
+};
+
+}  // namespace taut
