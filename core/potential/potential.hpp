@@ -288,6 +288,8 @@ public:
   /// Terms that can follow are told; allocates only if there have never been as many.
   void resize(Unknowns<Precision, Space> const& unknowns) {
     unknowns_ = unknowns;
+    bodies_ = {};
+    asleep_.clear();
     make_room();
     for_each_term([&](auto& term) {
       if constexpr (requires { term.resize(unknowns); }) term.resize(unknowns);
