@@ -1,0 +1,17 @@
+// The kernels of material points, instantiated once (see all_kernels.cu).
+#include <taut/core/potential/potential.hpp>
+#include <taut/integrators/ncg.hpp>
+#include <taut/integrators/time_stepper.hpp>
+#include <taut/materials/models.hpp>
+#include <taut/mpm/elastic_particles.hpp>
+#include <taut/mpm/particle_stepper.hpp>
+
+using namespace taut;
+
+using Points = ElasticParticles<Elastic<StableNeoHookean>>;
+template class taut::ElasticParticles<Elastic<StableNeoHookean>>;
+template class taut::ElasticParticles<Elastic<NeoHookean>, CubicSpline, Fp64>;
+
+using Stepper = ParticleStepper<ImplicitEuler<Ncg<DaiKou, BlockJacobi>>>;
+template auto Stepper::step(Potential<Inertia<>, Points>&, Stepper::Grid&, Particles<Mixed> const&,
+                            double);
