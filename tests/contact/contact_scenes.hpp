@@ -7,6 +7,7 @@
 #include <taut/core/fem/body.hpp>
 #include <taut/core/fem/shapes.hpp>
 
+#include <algorithm>
 #include <cmath>
 #include <random>
 #include <vector>
@@ -147,9 +148,13 @@ inline int intersections(Surface const& surface, std::vector<Point> const& x) {
     for (Triangle const& t : surface.triangles) {
       bool const shared = e[0] == t[0] || e[0] == t[1] || e[0] == t[2] || e[1] == t[0] ||
                           e[1] == t[1] || e[1] == t[2];
-      if (shared || (volume(t[0], t[1], t[2], e[0]) > 0) == (volume(t[0], t[1], t[2], e[1]) > 0)) {
-        continue;
-      }
+      long double const from = volume(t[0], t[1], t[2], e[0]), to = volume(t[0], t[1], t[2], e[1]);
+      long double side = 0;
+      for (int k = 0; k < 3; ++k)
+        side = std::max(side, std::abs((long double)x[t[1]][k] - x[t[0]][k]));
+      // Within a flat face (of a body in free flight) signs are those of round-off.
+      bool const flat = std::max(std::abs(from), std::abs(to)) < 1e-12L * side * side * side;
+      if (shared || flat || (from > 0) == (to > 0)) continue;
       bool const first = volume(e[0], e[1], t[0], t[1]) > 0;
       count += first == (volume(e[0], e[1], t[1], t[2]) > 0) &&
                first == (volume(e[0], e[1], t[2], t[0]) > 0);
