@@ -49,8 +49,7 @@ struct Stacks {
 template <class P>
 struct StackTerms {
   using Elasticity = ElasticTets<Elastic<StableNeoHookean>, P>;
-  using Touch =
-      Contact<PairEnergy<>, SpatialHash<DefaultSpace>, AdditiveCcd, ElasticInclusiveStiffness, P>;
+  using Touch = Contact<PairEnergy<>, Bvh<DefaultSpace>, AdditiveCcd, ElasticInclusiveStiffness, P>;
   using Ground = Obstacle<HalfSpace, Normalised<LogBarrier>, ElasticInclusiveStiffness, P>;
   using All = Potential<Inertia<P>, BodyForce<P>, Elasticity, StencilTerm<Band, P>, Touch, Ground,
                         Friction<P>>;

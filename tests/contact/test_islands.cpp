@@ -22,7 +22,7 @@ namespace {
 
 using Elasticity = ElasticTets<Elastic<StableNeoHookean>, Fp64>;
 using Touch =
-    Contact<PairEnergy<>, SpatialHash<DefaultSpace>, AdditiveCcd, ElasticInclusiveStiffness, Fp64>;
+    Contact<PairEnergy<>, Bvh<DefaultSpace>, AdditiveCcd, ElasticInclusiveStiffness, Fp64>;
 using Terms = Potential<Inertia<Fp64>, BodyForce<Fp64>, Elasticity, Touch>;
 using Stepper = ImplicitEuler<Ncg<DaiKou, BlockJacobi, SufficientDecrease, DecrementWindow, Fp64>>;
 

@@ -5,12 +5,14 @@
 #include <taut/materials/models.hpp>
 #include <taut/mpm/elastic_particles.hpp>
 #include <taut/mpm/particle_stepper.hpp>
+#include <taut/mpm/slip.hpp>
 
 using namespace taut;
 
 using Points = ElasticParticles<Elastic<StableNeoHookean>>;
 template class taut::ElasticParticles<Elastic<StableNeoHookean>>;
 template class taut::ElasticParticles<Elastic<NeoHookean>, CubicSpline, Fp64>;
+template class taut::Slip<>;
 
 using Stepper = ParticleStepper<ImplicitEuler<Ncg<DaiKou, BlockJacobi>>>;
 template auto Stepper::step(Potential<Inertia<>, Points>&, Stepper::Grid&, Particles<Mixed> const&,
