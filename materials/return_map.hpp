@@ -50,7 +50,8 @@ inline constexpr T thinnest = T(1e-4);
 
 template <class T>
 KOKKOS_FUNCTION Vec3<T> raised(Vec3<T> const& s) {
-  return {max(s[0], thinnest<T>), max(s[1], thinnest<T>), max(s[2], thinnest<T>)};
+  T const least = thinnest<T>;  // a device has no address for the constant
+  return {max(s[0], least), max(s[1], least), max(s[2], least)};
 }
 
 template <class T>
