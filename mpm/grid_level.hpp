@@ -79,6 +79,12 @@ private:
 template <class S>
 class GridLevel {
 public:
+  /// The nodes of a list, each leaf in it once.
+  void assign(LeafList const& leaves, double dx) {
+    topology_.clear();
+    for (int l = 0; l < leaves.size(); ++l) topology_.add(leaves.origin[l], leaves.mask[l]);
+    number(dx);
+  }
   /// The nodes that kernels of `width` nodes per axis (2 to 4) reach whose lowest nodes are `from`;
   /// `dx` is the spacing, m.
   void reach(LeafList const& from, int width, double dx) {

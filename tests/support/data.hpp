@@ -24,4 +24,9 @@ inline nlohmann::json vectors(std::string const& key) {
   return nlohmann::json::parse(std::ifstream(data_file("vectors/pncg_vectors.json"))).at(key);
 }
 
+/// Of the material point method.
+inline nlohmann::json hot_vectors(std::string const& key) {
+  return nlohmann::json::parse(std::ifstream(data_file("vectors/hot_vectors.json"))).at(key);
+}
+
 }  // namespace taut::test

@@ -1,0 +1,265 @@
+// Galerkin multigrid over the nodes of a grid (Wang et al. 2020, sections 4 and 5): one cycle is a
+// symmetric operator close to the inverse of the matrix of its fine level, so it serves as a
+// preconditioner and as the initial metric of L-BFGS.
+//
+//   smooth, restrict the residual, a cycle on the coarser level (or two: a W-cycle), prolong,
+//   smooth
+//
+// Every coarser level has the nodes that the finer one is interpolated from, and the matrix P'AP,
+// down to so few nodes that a dense inverse is cheap. What the fine level is (a matrix, or an
+// operator without one), how it hangs on the next, and how levels are smoothed are policies.
+#pragma once
+
+#include <taut/core/sparse/dense_inverse.hpp>
+#include <taut/mpm/grid_level.hpp>
+#include <taut/mpm/smoother.hpp>
+
+#include <deque>
+#include <vector>
+
+namespace taut {
+
+namespace kernels {
+
+/// The dense matrix of a level, by rows.
+template <class S, class T, int radius>
+struct SpreadRow {
+  GridMatrix<S, T, radius> a;
+  Kokkos::View<double**, Kokkos::LayoutRight, typename S::memory> to;
+  KOKKOS_FUNCTION void operator()(int i) const {
+    for (int j = 0; j < 3 * a.size(); ++j)
+      for (int r = 0; r < 3; ++r) to(3 * i + r, j) = 0;
+    for (int dx = -radius; dx <= radius; ++dx)
+      for (int dy = -radius; dy <= radius; ++dy)
+        for (int dz = -radius; dz <= radius; ++dz) {
+          int const j = a.nodes.near(a.nodes.leaf(i), a.nodes.ijk(i, 0) + dx,
+                                     a.nodes.ijk(i, 1) + dy, a.nodes.ijk(i, 2) + dz);
+          if (j < 0) continue;
+          Mat3<T> const b = a.block(i, dx, dy, dz);
+          for (int r = 0; r < 3; ++r)
+            for (int c = 0; c < 3; ++c) to(3 * i + r, 3 * j + c) = double(b(r, c));
+        }
+  }
+};
+
+}  // namespace kernels
+
+/// What a hierarchy has become.
+struct MultigridReport {
+  std::vector<int> nodes;  ///< of each level, from the finest
+  bool direct = false;     ///< whether the coarsest level is inverted; else it is smoothed
+  double shift = 0;        ///< that the coarsest matrix needed to be positive definite, see
+                           ///< invert_positive
+  std::size_t memory = 0;  ///< bytes of matrices
+};
+
+/// `Fine` is the fine level (MatrixLevel or ActionLevel), `T` the scalar of the coarser ones.
+template <class Fine, class FineSmoother = ForwardBackward, class Smoother = ForwardBackward,
+          class Embedding = LinearEmbedding, class T = float>
+class Multigrid {
+public:
+  using Space = typename Fine::Space;
+  using S = Space;
+  using FineScalar = typename Fine::Scalar;
+  /// Stencils of every coarser level, whatever that of the fine one.
+  static constexpr int radius = Embedding::radius == 1 ? 2 : 3;
+
+  struct Params {
+    int max_levels = 20;    ///< the fine one counted
+    int direct_nodes = 60;  ///< the coarsest level may have so many; there is no coarser one then
+    int visits = 1;         ///< of a coarser level in a cycle: 1 is a V-cycle, 2 a W-cycle
+    int coarse_sweeps = 8;  ///< of the coarsest level, where it is not inverted
+    typename FineSmoother::Params fine = {};
+    typename Smoother::Params smoother = {};
+  };
+
+  Multigrid() : Multigrid(Params()) {}
+  explicit Multigrid(Params const& params) : params_(params), fine_smoother_(params.fine) {}
+
+  /// Builds all levels below `fine`, which is finished and must outlive this. Allocates what
+  /// is larger than ever, and scratch for the coarsest level.
+  void build(Fine const& fine) {
+    fine_ = &fine;
+    report_ = {};
+    report_.nodes.push_back(fine.size());
+    fine_vectors_.resize(fine.size());
+    fine_smoother_.setup(fine, fine_vectors_);
+    used_ = 0;
+    list_free_nodes();
+    LeafList const* finer = &free_;
+    double dx = fine.nodes().dx;
+    while (add_level(*finer, dx)) {
+      finer = &levels_[used_ - 1].grid.leaves();
+      dx *= 2;
+    }
+    if (used_ > 0) invert_coarsest();
+    for (std::size_t l = 0; l < used_; ++l) report_.memory += levels_[l].level.memory();
+    report_.memory += fine.memory();
+  }
+
+  /// z = (one cycle from nothing) g. Allocates nothing.
+  template <class X>
+  void apply(VectorField<X, S> const& g, VectorField<X, S> const& z) const {
+    int const n = fine_->size();
+    for_each<S>("cycle_begin", n, kernels::ConvertVectors<S, X, FineScalar>{g, fine_vectors_.b});
+    cycle();
+    for_each<S>("cycle_end", n, kernels::ConvertVectors<S, FineScalar, X>{fine_vectors_.x, z});
+  }
+
+  MultigridReport const& report() const { return report_; }
+  Params const& params() const { return params_; }
+  /// Level `l` below the fine one.
+  MatrixLevel<S, T, radius> const& level(int l) const { return levels_[l].level; }
+
+private:
+  struct Level {
+    GridLevel<S> grid;
+    MatrixLevel<S, T, radius> level;
+    LevelVectors<T, S> vectors;
+    VectorField<T, S> before;  ///< what the visits before have found
+    Smoother smoother;
+  };
+
+  /// The nodes that P has a part in.
+  void list_free_nodes() {
+    GridNodes<S> const& nodes = fine_->nodes();
+    std::size_t const n = static_cast<std::size_t>(nodes.leaves.count);
+    grow(mask_, host_mask_, "free_mask", n);
+    grow(origin_, host_origin_, "free_origin", n);
+    if (fine_->fixed().extent(0) > 0) {
+      for_each<S>("free_nodes", nodes.leaves.count,
+                  kernels::FreeNodes<S>{nodes, fine_->fixed(), mask_});
+      S::instance().fence("taut: free nodes");
+      copy_front<S>(mask_, host_mask_, n);
+    } else {
+      copy_front<S>(nodes.mask, host_mask_, n);
+    }
+    copy_front<S>(nodes.leaves.origin, host_origin_, n);
+    free_.clear();
+    for (std::size_t l = 0; l < n; ++l) {
+      free_.origin.push_back({host_origin_(l, 0), host_origin_(l, 1), host_origin_(l, 2)});
+      LeafMask& mask = free_.mask.emplace_back();
+      for (int x = 0; x < 8; ++x) mask[x] = host_mask_(l, x);
+    }
+  }
+
+  /// One more level, unless there are enough.
+  bool add_level(LeafList const& finer, double dx) {
+    int const above = report_.nodes.back();
+    if (static_cast<int>(report_.nodes.size()) >= params_.max_levels) return false;
+    if (used_ > 0 && above <= params_.direct_nodes) return false;
+    if (used_ == levels_.size()) levels_.emplace_back();
+    Level& l = levels_[used_];
+    l.grid.coarsen(finer, Embedding::radius, dx);
+    int const count = l.grid.nodes().count;
+    // Far-off crumbs of a few nodes stay as many on every level.
+    if (count == 0 || (used_ > 0 && 10 * count > 9 * above)) return false;
+    l.level.resize(l.grid.nodes());
+    if (used_ == 0) {
+      fine_->template coarse_matrix<Embedding>(l.level.matrix());
+    } else {
+      levels_[used_ - 1].level.template coarse_matrix<Embedding>(l.level.matrix());
+    }
+    l.level.finish();
+    l.vectors.resize(count);
+    if (params_.visits > 1) grow(l.before, "level_vector", static_cast<std::size_t>(count));
+    l.smoother = Smoother(params_.smoother);
+    l.smoother.setup(l.level, l.vectors);
+    ++used_;
+    report_.nodes.push_back(count);
+    return true;
+  }
+
+  void invert_coarsest() {
+    MatrixLevel<S, T, radius> const& level = levels_[used_ - 1].level;
+    int const n = level.size();
+    report_.direct = n <= params_.direct_nodes;
+    if (!report_.direct) {
+      grow(levels_[used_ - 1].before, "level_vector", static_cast<std::size_t>(n));
+      return;
+    }
+    Kokkos::View<double**, Kokkos::LayoutRight, typename S::memory> const dense("coarsest", 3 * n,
+                                                                                3 * n);
+    for_each<S>("coarsest", n, kernels::SpreadRow<S, T, radius>{level.matrix(), dense});
+    S::instance().fence("taut: coarsest level");
+    auto const host = Kokkos::create_mirror_view_and_copy(Kokkos::HostSpace(), dense);
+    std::vector<double> numbers(host.data(), host.data() + host.size());
+    // What rounding the blocks of a row does to its sum: some ten units in the last place.
+    report_.shift =
+        inverse_.factorize(std::move(numbers), n, 16 * double(std::numeric_limits<T>::epsilon()));
+  }
+
+  /// From fine_vectors_.b to fine_vectors_.x.
+  void cycle() const {
+    auto const& v = fine_vectors_;
+    fine_smoother_.first(*fine_, v);
+    if (used_ > 0) {
+      Level const& below = levels_[0];
+      restrict_to<Embedding>(fine_->nodes(), fine_->fixed(), v.r, below.level.nodes(),
+                             below.vectors.b);
+      visit(0);
+      add_prolonged<Embedding>(below.level.nodes(), below.vectors.x, fine_->nodes(), fine_->fixed(),
+                               v.x);
+    }
+    fine_smoother_.second(*fine_, v);
+  }
+
+  /// From b to x of level l, by as many cycles as asked for.
+  void visit(std::size_t l) const {
+    Level const& level = levels_[l];
+    bool const exact = l + 1 == used_ && report_.direct;
+    int const visits = exact ? 1 : l + 1 == used_ ? params_.coarse_sweeps : params_.visits;
+    auto const& v = level.vectors;
+    int const n = level.level.size();
+    for (int k = 0; k < visits; ++k) {
+      if (k > 0) {
+        // x = x + cycle (b - A x); the cycle starts from its own b.
+        level.level.residual(v.b, v.x, v.r);
+        for_each<S>("cycle_keep", n, kernels::ConvertVectors<S, T, T>{v.r, v.b});
+        if (k == 1) {
+          for_each<S>("cycle_keep", n, kernels::ConvertVectors<S, T, T>{v.x, level.before});
+        } else {
+          for_each<S>("cycle_add", n, kernels::AddVectors<S, T>{v.x, level.before});
+        }
+      }
+      once(l);
+    }
+    if (visits > 1) for_each<S>("cycle_add", n, kernels::AddVectors<S, T>{level.before, v.x});
+  }
+
+  void once(std::size_t l) const {
+    Level const& level = levels_[l];
+    auto const& v = level.vectors;
+    if (l + 1 == used_ && report_.direct) {
+      inverse_.apply(v.b, v.x);
+      return;
+    }
+    level.smoother.first(level.level, v);
+    if (l + 1 < used_) {
+      Level const& below = levels_[l + 1];
+      restrict_to<Embedding>(level.level.nodes(), FixedNodes<S>(), v.r, below.level.nodes(),
+                             below.vectors.b);
+      visit(l + 1);
+      add_prolonged<Embedding>(below.level.nodes(), below.vectors.x, level.level.nodes(),
+                               FixedNodes<S>(), v.x);
+    }
+    level.smoother.second(level.level, v);
+  }
+
+  Params params_;
+  Fine const* fine_ = nullptr;
+  FineSmoother fine_smoother_;
+  LevelVectors<FineScalar, S> fine_vectors_;
+  std::deque<Level> levels_;  ///< below the fine one; the first `used_` of them
+  std::size_t used_ = 0;
+  DenseInverse<S> inverse_;
+  MultigridReport report_;
+
+  LeafList free_;
+  typename GridNodes<S>::template PerLeaf<std::uint64_t* [8]> mask_;
+  typename decltype(mask_)::HostMirror host_mask_;
+  typename GridNodes<S>::template PerLeaf<int* [3]> origin_;
+  typename decltype(origin_)::HostMirror host_origin_;
+};
+
+}  // namespace taut

@@ -1,0 +1,275 @@
+// Smoothers: what a level does about errors that change from node to node. Each has a first half,
+// from nothing, which also leaves the residual for the coarser level,
+//
+//   x = S b,   r = b - A x,
+//
+// and a second, x += S'(b - A x), so that a cycle that has them on its way down and up is
+// symmetric.
+#pragma once
+
+#include <taut/mpm/level_operator.hpp>
+#include <taut/mpm/spectrum.hpp>
+
+namespace taut {
+namespace kernels {
+
+/// x_i = D^-1 (b_i - sum_j A_ij x_j), with the own block not in the sum.
+template <class S, class T>
+struct SolveNode {
+  BlockField<T, S> inverse;
+  VectorField<T, S> b, x;
+  KOKKOS_FORCEINLINE_FUNCTION Vec3<T> operator()(int i, Vec3<T> const&, Vec3<T> const& sum) const {
+    Vec3<T> const value = block_times(inverse, i, vector_of<T>(b, i) - sum);
+    set_vector(x, i, value);
+    return value;
+  }
+};
+
+/// x_i += D^-1 (b_i - sum_j A_ij x_j)
+template <class S, class T>
+struct RelaxNode {
+  BlockField<T, S> inverse;
+  VectorField<T, S> b, x;
+  KOKKOS_FORCEINLINE_FUNCTION Vec3<T> operator()(int i, Vec3<T> const& own,
+                                                 Vec3<T> const& sum) const {
+    Vec3<T> const value = own + block_times(inverse, i, vector_of<T>(b, i) - sum);
+    set_vector(x, i, value);
+    return value;
+  }
+};
+
+/// x_i -= D^-1 sum_j A_ij x_j, with the own block not in the sum.
+template <class S, class T>
+struct ReduceNode {
+  BlockField<T, S> inverse;
+  VectorField<T, S> x;
+  KOKKOS_FORCEINLINE_FUNCTION Vec3<T> operator()(int i, Vec3<T> const&, Vec3<T> const& sum) const {
+    Vec3<T> const value = vector_of<T>(x, i) - block_times(inverse, i, sum);
+    set_vector(x, i, value);
+    return value;
+  }
+};
+
+/// r_i = -sum_j A_ij x_j over the nodes after i.
+template <class S, class T>
+struct StoreUpper {
+  VectorField<T, S> x, r;
+  KOKKOS_FORCEINLINE_FUNCTION Vec3<T> operator()(int i, Vec3<T> const&, Vec3<T> const& sum) const {
+    set_vector(r, i, -sum);
+    return vector_of<T>(x, i);
+  }
+};
+
+/// One step of a recursion in D^-1 r: d = keep d + take D^-1 r, x += d, where r is `b` the first
+/// time (and is set to it), and r - y after.
+template <class S, class T>
+struct RecursionStep {
+  BlockField<T, S> inverse;
+  VectorField<T, S> b, r, y, d, x;
+  T keep, take;
+  bool first;  ///< r = b, and x has nothing in it
+  KOKKOS_FUNCTION void operator()(int i) const { step(i); }
+  [[gnu::noinline]] KOKKOS_FUNCTION void step(int i) const {
+    Vec3<T> const residual = first ? vector_of<T>(b, i) : vector_of<T>(r, i) - vector_of<T>(y, i);
+    Vec3<T> next = take * block_times(inverse, i, residual);
+    if (keep != 0) next = next + keep * vector_of<T>(d, i);
+    set_vector(r, i, residual);
+    set_vector(d, i, next);
+    set_vector(x, i, first ? next : vector_of<T>(x, i) + next);
+  }
+};
+
+/// r -= y
+template <class S, class T>
+struct SubtractProduct {
+  VectorField<T, S> y, r;
+  KOKKOS_FUNCTION void operator()(int i) const {
+    for (int c = 0; c < 3; ++c) r(i, c) -= y(i, c);
+  }
+};
+
+}  // namespace kernels
+
+/// Block Gauss-Seidel forward on the way down and backward on the way up: symmetric as a pair, at
+/// half the cost of symmetric sweeps. Nodes in the order of the colours of their blocks and in a
+/// block in that of their numbers, so the result does not depend on the number of threads.
+struct ForwardBackward {
+  static constexpr char const* name = "forward_backward";
+  struct Params {};
+  ForwardBackward() = default;
+  explicit ForwardBackward(Params const&) {}
+
+  template <class A, class V>
+  void setup(A const&, V&) {}
+
+  template <class S, class T, int radius>
+  void first(MatrixLevel<S, T, radius> const& a, LevelVectors<T, S> const& v) const {
+    using kernels::Part;
+    sweep_blocks("gauss_seidel_forward", a.matrix(), v.x,
+                 kernels::SolveNode<S, T>{a.inverse(), v.b, v.x}, Part::before, true, false);
+    // (D + L) x = b leaves the residual -U x.
+    sweep_blocks("gauss_seidel_upper", a.matrix(), v.x, kernels::StoreUpper<S, T>{v.x, v.r},
+                 Part::after, false, true);
+  }
+  template <class S, class T, int radius>
+  void second(MatrixLevel<S, T, radius> const& a, LevelVectors<T, S> const& v) const {
+    sweep_blocks("gauss_seidel_backward", a.matrix(), v.x,
+                 kernels::RelaxNode<S, T>{a.inverse(), v.b, v.x}, kernels::Part::all, true, true);
+  }
+};
+
+/// Symmetric block Gauss-Seidel, (D + L) D^-1 (D + U), as HOT has it.
+struct SymmetricGaussSeidel {
+  static constexpr char const* name = "symmetric_gauss_seidel";
+  struct Params {
+    int sweeps = 1;
+  };
+  SymmetricGaussSeidel() : SymmetricGaussSeidel(Params()) {}
+  explicit SymmetricGaussSeidel(Params const& params) : params_(params) {}
+
+  template <class A, class V>
+  void setup(A const&, V&) {}
+
+  template <class S, class T, int radius>
+  void first(MatrixLevel<S, T, radius> const& a, LevelVectors<T, S> const& v) const {
+    sweep(a, v.b, v.x);
+    for (int k = 1; k < params_.sweeps; ++k) second_once(a, v);
+    a.residual(v.b, v.x, v.r);
+  }
+  template <class S, class T, int radius>
+  void second(MatrixLevel<S, T, radius> const& a, LevelVectors<T, S> const& v) const {
+    for (int k = 0; k < params_.sweeps; ++k) second_once(a, v);
+  }
+
+private:
+  template <class S, class T, int radius>
+  void second_once(MatrixLevel<S, T, radius> const& a, LevelVectors<T, S> const& v) const {
+    a.residual(v.b, v.x, v.r);
+    sweep(a, v.r, v.d);
+    for_each<S>("gauss_seidel_add", a.size(), kernels::AddVectors<S, T>{v.d, v.x});
+  }
+  /// x = (D + U)^-1 D (D + L)^-1 b
+  template <class S, class T, int radius>
+  static void sweep(MatrixLevel<S, T, radius> const& a, VectorField<T, S> const& b,
+                    VectorField<T, S> const& x) {
+    using kernels::Part;
+    sweep_blocks("gauss_seidel_forward", a.matrix(), x, kernels::SolveNode<S, T>{a.inverse(), b, x},
+                 Part::before, true, false);
+    sweep_blocks("gauss_seidel_back", a.matrix(), x, kernels::ReduceNode<S, T>{a.inverse(), x},
+                 Part::after, true, true);
+  }
+
+  Params params_;
+};
+
+/// Damped block Jacobi, x += damping D^-1 r. Converges where damping < 2 / lambda_max(D^-1 A),
+/// which is 5 to 8 for quadratic B-splines.
+struct DampedJacobi {
+  static constexpr char const* name = "damped_jacobi";
+  struct Params {
+    double damping = 0.3;  ///< 0: 4/3 of 1 / lambda_max by Lanczos
+    int sweeps = 1;
+  };
+  DampedJacobi() : DampedJacobi(Params()) {}
+  explicit DampedJacobi(Params const& params) : params_(params), damping_(params.damping) {}
+
+  template <LevelOperator A, class V>
+  void setup(A const& a, V& v) {
+    if (params_.damping == 0) damping_ = 4 / (3 * largest_eigenvalue(a, v));
+  }
+  template <class A, class T, class S>
+  void first(A const& a, LevelVectors<T, S> const& v) const {
+    run(a, v, true);
+    a.residual(v.b, v.x, v.r);
+  }
+  template <class A, class T, class S>
+  void second(A const& a, LevelVectors<T, S> const& v) const {
+    run(a, v, false);
+  }
+
+private:
+  template <class A, class T, class S>
+  void run(A const& a, LevelVectors<T, S> const& v, bool from_nothing) const {
+    for (int k = 0; k < params_.sweeps; ++k) {
+      bool const first = from_nothing && k == 0;
+      if (!first) {
+        a.product(v.x, v.y);
+        for_each<S>("jacobi_residual", a.size(), kernels::SubtractFrom<S, T>{v.b, v.y});
+      }
+      // The residual that the step takes is b, or what y has become; and nothing is taken off it.
+      kernels::RecursionStep<S, T> step{a.inverse(), first ? v.b : v.y, v.r, v.y, v.d, v.x,
+                                        T(0),        T(damping_),       true};
+      if (first) {
+        for_each<S>("jacobi_step", a.size(), step);
+      } else {
+        step.x = v.d;
+        for_each<S>("jacobi_step", a.size(), step);
+        for_each<S>("jacobi_add", a.size(), kernels::AddVectors<S, T>{v.d, v.x});
+      }
+    }
+  }
+
+  Params params_;
+  double damping_;
+};
+
+/// The Chebyshev polynomial in D^-1 A that is smallest over [lambda_max / ratio, lambda_max] (Saad
+/// 2003, algorithm 12.1): products alone, so the smoother of a level without a matrix.
+struct Chebyshev {
+  static constexpr char const* name = "chebyshev";
+  struct Params {
+    int degree = 3;
+    double ratio = 30;    ///< of the largest eigenvalue to the least that is smoothed
+    double safety = 1.1;  ///< on the largest, of which Lanczos sees too little
+    int steps = 8;        ///< of Lanczos
+  };
+  Chebyshev() : Chebyshev(Params()) {}
+  explicit Chebyshev(Params const& params) : params_(params) {}
+
+  /// The largest eigenvalue of D^-1 A, by Lanczos.
+  template <LevelOperator A, class V>
+  void setup(A const& a, V& v) {
+    largest_ = params_.safety * largest_eigenvalue(a, v, params_.steps);
+  }
+  double largest() const { return largest_; }
+
+  template <class A, class T, class S>
+  void first(A const& a, LevelVectors<T, S> const& v) const {
+    run(a, v, true);
+    a.product(v.d, v.y);
+    for_each<S>("chebyshev_residual", a.size(), kernels::SubtractProduct<S, T>{v.y, v.r});
+  }
+  template <class A, class T, class S>
+  void second(A const& a, LevelVectors<T, S> const& v) const {
+    run(a, v, false);
+  }
+
+private:
+  template <class A, class T, class S>
+  void run(A const& a, LevelVectors<T, S> const& v, bool from_nothing) const {
+    double const least = largest_ / params_.ratio;
+    double const middle = (largest_ + least) / 2, half = (largest_ - least) / 2;
+    double rho = half / middle;
+    kernels::RecursionStep<S, T> step{a.inverse(), v.b,  v.r,           v.y,         v.d,
+                                      v.x,         T(0), T(1 / middle), from_nothing};
+    if (!from_nothing) {
+      a.product(v.x, v.y);
+      for_each<S>("chebyshev_start", a.size(), kernels::ConvertVectors<S, T, T>{v.b, v.r});
+    }
+    for_each<S>("chebyshev_step", a.size(), step);
+    step.first = false;
+    for (int k = 1; k < params_.degree; ++k) {
+      double const next = 1 / (2 * middle / half - rho);
+      step.keep = T(next * rho);
+      step.take = T(2 * next / half);
+      rho = next;
+      a.product(v.d, v.y);
+      for_each<S>("chebyshev_step", a.size(), step);
+    }
+  }
+
+  Params params_;
+  double largest_ = 1;
+};
+
+}  // namespace taut

@@ -1,0 +1,112 @@
+// The largest eigenvalue of D^-1 A, with D the diagonal blocks of A: by Lanczos' method in the form
+// of conjugate gradients (Saad 2003, section 6.7.3), whose coefficients are those of a tridiagonal
+// matrix with nearly the same extreme eigenvalues. A few power iterations, in comparison, stay 10
+// to 15 percent below it.
+#pragma once
+
+#include <taut/mpm/level_operator.hpp>
+
+#include <cmath>
+#include <vector>
+
+namespace taut {
+
+/// The largest eigenvalue of the symmetric tridiagonal matrix with these diagonals, by bisection;
+/// `beside` has one entry less.
+double largest_tridiagonal(std::vector<double> const& diagonal, std::vector<double> const& beside);
+
+namespace kernels {
+
+/// Numbers in [-1, 1] that follow from the place of a node alone.
+template <class S, class T>
+struct ScatterNumbers {
+  GridNodes<S> nodes;
+  VectorField<T, S> to;
+  KOKKOS_FUNCTION void operator()(int i) const {
+    for (int c = 0; c < 3; ++c) {
+      unsigned h =
+          LeafTable<S>::hash(8 * nodes.ijk(i, 0), 8 * nodes.ijk(i, 1), 8 * nodes.ijk(i, 2)) +
+          0x9e3779b9u * static_cast<unsigned>(c + 1);
+      h ^= h >> 16;
+      h *= 0x7feb352du;
+      h ^= h >> 15;
+      h *= 0x846ca68bu;
+      h ^= h >> 16;
+      to(i, c) = T(2 * (double(h) / 4294967295.0) - 1);
+    }
+  }
+};
+
+/// (r - alpha y)' D^-1 (r - alpha y), which becomes r; and D^-1 r becomes y.
+template <class S, class T>
+struct LanczosResidual {
+  BlockField<T, S> inverse;
+  VectorField<T, S> r, y;
+  T alpha;
+  KOKKOS_FUNCTION void operator()(int i, Sums<double, 1>& sums) const { sums[0] += term(i); }
+  [[gnu::noinline]] KOKKOS_FUNCTION double term(int i) const {
+    Vec3<T> residual = vector_of<T>(r, i);
+    if (alpha != 0) residual = residual - alpha * vector_of<T>(y, i);
+    Vec3<T> const z = block_times(inverse, i, residual);
+    set_vector(r, i, residual);
+    set_vector(y, i, z);
+    return double(residual[0]) * double(z[0]) + double(residual[1]) * double(z[1]) +
+           double(residual[2]) * double(z[2]);
+  }
+};
+
+/// d = y + beta d
+template <class S, class T>
+struct LanczosDirection {
+  VectorField<T, S> y, d;
+  T beta;
+  KOKKOS_FUNCTION void operator()(int i) const { step(i); }
+  [[gnu::noinline]] KOKKOS_FUNCTION void step(int i) const {
+    for (int c = 0; c < 3; ++c) d(i, c) = beta == 0 ? y(i, c) : y(i, c) + beta * d(i, c);
+  }
+};
+
+template <class S, class T>
+struct VectorDot {
+  VectorField<T, S> a, b;
+  KOKKOS_FUNCTION void operator()(int i, Sums<double, 1>& sums) const { sums[0] += term(i); }
+  [[gnu::noinline]] KOKKOS_FUNCTION double term(int i) const {
+    return double(a(i, 0)) * double(b(i, 0)) + double(a(i, 1)) * double(b(i, 1)) +
+           double(a(i, 2)) * double(b(i, 2));
+  }
+};
+
+}  // namespace kernels
+
+/// The largest eigenvalue of D^-1 A, from below. Uses the vectors r, d and y.
+template <LevelOperator A, class T, class S>
+double largest_eigenvalue(A const& a, LevelVectors<T, S> const& v, int steps = 8) {
+  int const n = a.size();
+  if (n == 0) return 1;
+  Reducer<S> const reducer(n, 1);
+  for_each<S>("lanczos_start", n, kernels::ScatterNumbers<S, T>{a.nodes(), v.r});
+  std::vector<double> diagonal, beside;
+  kernels::LanczosResidual<S, T> residual{a.inverse(), v.r, v.y, T(0)};
+  double rho = reducer.template sum<1>("lanczos_residual", n, residual)[0];
+  double beta = 0, alpha_before = 1;
+  for (int k = 0; k < steps; ++k) {
+    for_each<S>("lanczos_direction", n, kernels::LanczosDirection<S, T>{v.y, v.d, T(beta)});
+    a.product(v.d, v.y);
+    double const form =
+        reducer.template sum<1>("lanczos_form", n, kernels::VectorDot<S, T>{v.d, v.y})[0];
+    if (!(form > 0 && rho > 0)) break;  // found everything, or A is not positive
+    double const alpha = rho / form;
+    diagonal.push_back(1 / alpha + beta / alpha_before);
+    residual.alpha = T(alpha);
+    double const next = reducer.template sum<1>("lanczos_residual", n, residual)[0];
+    beta = next / rho;
+    beside.push_back(std::sqrt(std::max(beta, 0.0)) / alpha);
+    alpha_before = alpha;
+    rho = next;
+  }
+  if (diagonal.empty()) return 1;
+  beside.resize(diagonal.size() - 1);
+  return largest_tridiagonal(diagonal, beside);
+}
+
+}  // namespace taut
