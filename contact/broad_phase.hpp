@@ -31,12 +31,18 @@ struct QueryGroup {
 /// A set of boxes that is searched from kernels; copied to the device.
 /// `visit(box, least, visitor)` calls `visitor(j)` once for each box j of the set that overlaps
 /// `box` and is in the size class `least` or above, in any order; it may show smaller ones too.
-/// An index may also have `visit_group(group, visitor)`, which calls `visitor(a, j)` for box a of a
+/// A GroupIndex also has `visit_group(group, visitor)`, which calls `visitor(a, j)` for box a of a
 /// group: it goes through the set once for all of them.
 template <class I>
 concept BoxIndex = requires(I const& index, SearchBox const& box, SizeClass least,
                             void (*visitor)(int)) {
   {index.visit(box, least, visitor)};
+};
+
+template <class I>
+concept GroupIndex = BoxIndex<I> &&
+    requires(I const& index, QueryGroup const& group, void (*visitor)(int, int)) {
+  {index.visit_group(group, visitor)};
 };
 
 /// A way to find the boxes that overlap: constructed for up to `count` boxes, most of which have
@@ -184,9 +190,9 @@ struct FindPairs {
   };
   KOKKOS_FUNCTION void operator()(int g) const {
     Visitor visitor{*this, group * g, {}, {}};
-    int const n = Kokkos::min(group, boxes - group * g);
+    int const left = boxes - group * g, n = left < group ? left : int(group);
     for (int a = 0; a < n; ++a) visitor.asker[a] = pairing.asker(group * g + a);
-    if constexpr (group > 1 && requires(QueryGroup const& q) { index.visit_group(q, visitor); }) {
+    if constexpr (group > 1 && GroupIndex<Index>) {
       QueryGroup query{n, {}, {}};
       for (int a = 0; a < n; ++a) {
         query.box[a] = box(group * g + a);

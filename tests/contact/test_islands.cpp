@@ -218,7 +218,7 @@ TEST_CASE("an island that has ended is woken by what comes to touch it", "[islan
     // Nothing is left out of the gradient where it ended, and no term is left asleep.
     CHECK(split.gradient_norm(with.reached()) < 1e-5);
   }
-  CHECK(woken > 0);
+  if (speed > 10) CHECK(woken > 0);  // slower ones are joined from the start
   Point const after = split.momentum();
   for (int c = 0; c < 3; ++c) CHECK_THAT(after[c], WithinAbs(before[c], 1e-3));
 }

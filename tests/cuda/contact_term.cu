@@ -1,6 +1,6 @@
 // The kernels of the contact term, instantiated once (see all_kernels.cu).
-#include <taut/contact/bvh.hpp>
 #include <taut/contact/contact.hpp>
+#include <taut/contact/spatial_hash.hpp>
 #include <taut/core/potential/potential.hpp>
 
 using namespace taut;
