@@ -9,6 +9,7 @@
 
 #include <taut/contact/closest_features.hpp>
 #include <taut/contact/displacement.hpp>
+#include <taut/core/exec/growing.hpp>
 #include <taut/core/exec/scan.hpp>
 
 #include <limits>
@@ -155,7 +156,7 @@ public:
           "radius, or look for a vertex that has flown off",
           count);
     }
-    grow(ids_, "candidates", count);
+    grow(ids_, "candidates", static_cast<std::size_t>(count));
     count_ = static_cast<int>(count);
   }
 
@@ -185,15 +186,6 @@ public:
   }
 
 private:
-  /// Half as much again as asked for, so that a list that grows slowly is seldom moved.
-  template <class View>
-  static void grow(View& view, char const* name, std::int64_t count) {
-    if (view.extent(0) >= static_cast<std::size_t>(count)) return;
-    view = View();  // the old memory first
-    view = View(Kokkos::view_alloc(Kokkos::WithoutInitializing, std::string(name)),
-                static_cast<std::size_t>(count + count / 2));
-  }
-
   PairIds<S> ids_, spare_;
   kernels::NoteFields<S> notes_, spare_notes_;
   Kokkos::View<int*, typename S::memory> place_;
