@@ -163,12 +163,15 @@ private:
     return lengths();
   }
 
+  /// P g and P y, as P is pointwise.
+  kernels::PreconditionedGradient<P, S> preconditioned() const {
+    return {fields_.gradient, fields_.gradient_before, preconditioner_.curvature(), {}, {}};
+  }
   /// Scalar products of each island; with the last direction, of those bodies that keep it.
   void products() {
-    using Dot = kernels::IslandDots<P, S>;
+    using Dot = kernels::ConjugateDots<P, S>;
     auto const sums = islands_.sums().template sum<Dot::count>(
-        "island_dots", Dot{preconditioner_.curvature(), fields_.gradient, fields_.gradient_before,
-                           fields_.direction, fields_.mass});
+        "island_dots", Dot{preconditioned(), fields_.direction, fields_.mass});
     ledger_.for_each_working([&](Island& island) {
       Dots const last = island.dots;
       island.dots = {.g_P_g = last.g1_P1_g1, .g_p = last.g_p, .p_p = last.p_p, .g_g = last.g1_g1};
@@ -221,9 +224,8 @@ private:
     islands_.send_turns();
     using Update = kernels::IslandDirection<P, S>;
     auto const sums = islands_.sums().template sum<Update::count>(
-        "island_direction",
-        Update{preconditioner_.curvature(), fields_.gradient, fields_.gradient_before,
-               fields_.direction, fields_.mass, islands_.bodies().of, islands_.turns()});
+        "island_direction", Update{preconditioned(), fields_.direction, fields_.mass,
+                                   islands_.bodies().of, islands_.turns()});
     ledger_.for_each_working(
         [](Island& island) { island.dots.g_p = island.dots.p_p = island.metric = 0; });
     ledger_.for_each_working_body([&](int b, Island& island) {

@@ -7,7 +7,7 @@
 #pragma once
 
 #include <taut/core/potential/objective.hpp>
-#include <taut/integrators/preconditioner.hpp>
+#include <taut/integrators/conjugate_dots.hpp>
 
 #include <numeric>
 #include <vector>
@@ -21,35 +21,6 @@ struct Splitting {
 };
 
 namespace kernels {
-
-/// All scalar products of an iteration with a pointwise P, as ConjugateDots.
-template <class P, class S>
-struct IslandDots {
-  enum { g_P_g, g_P_y, y_P_y, before_P_before, g_p, y_p, g_g, g_Minv_g, count };
-  LocalMatrices<P, S> local;
-  VectorField<typename P::real, S> gradient, gradient_before, p;
-  Array<typename P::real, S> mass;
-
-  KOKKOS_FUNCTION void operator()(int i, Sums<typename P::sum, count>& sums) const {
-    using Sum = typename P::sum;
-    using Real = typename P::real;
-    auto const real_g = load3<Real>(gradient, i);
-    auto const real_y = real_g - load3<Real>(gradient_before, i);
-    auto const g = convert<Sum>(real_g), y = convert<Sum>(real_y);
-    auto const z = convert<Sum>(local.product(i, real_g));
-    auto const w = convert<Sum>(local.product(i, real_y));
-    auto const last = load3<Sum>(p, i);
-    Sum const gg = dot(g, g);
-    sums[g_P_g] += dot(g, z);
-    sums[g_P_y] += dot(g, w);
-    sums[y_P_y] += dot(y, w);
-    sums[before_P_before] += dot(g - y, z - w);
-    sums[g_p] += dot(g, last);
-    sums[y_p] += dot(y, last);
-    sums[g_g] += gg;
-    if (gg > 0) sums[g_Minv_g] += gg / Sum(mass(i));
-  }
-};
 
 /// What a pass does with the direction of a body.
 enum class Turn : int { rest = 0, renew = 1, keep = 2 };
@@ -66,8 +37,8 @@ struct BodyTurns {
 template <class P, class S>
 struct IslandDirection {
   enum { g_p, p_p, p_M_p, count };
-  LocalMatrices<P, S> local;
-  VectorField<typename P::real, S> gradient, gradient_before, p;
+  PreconditionedGradient<P, S> preconditioned;
+  VectorField<typename P::real, S> p;
   Array<typename P::real, S> mass;
   typename Bodies<S>::Indices body;
   BodyTurns<typename P::real, S> of;
@@ -77,20 +48,17 @@ struct IslandDirection {
     using Real = typename P::real;
     int const b = body(i);
     if (of.turn(b) == int(Turn::rest)) return store3(p, i, Vec3<Real>{});
-    auto const g = load3<Real>(gradient, i);
     auto next = load3<Real>(p, i);
     if (of.turn(b) == int(Turn::renew)) {
       Real const beta = of.beta(b), gamma = of.gamma(b);
-      Vec3<Real> const z = local.product(i, g);
+      Vec3<Real> const z = preconditioned.of_gradient(i);
       next = beta != 0 ? beta * next - z : -z;
-      if (gamma != 0) {
-        next = next + gamma * local.product(i, g - load3<Real>(gradient_before, i));
-      }
+      if (gamma != 0) next = next + gamma * preconditioned.of_change(i);
       store3(p, i, next);
     }
     auto const wide = convert<Sum>(next);
     Sum const pp = dot(wide, wide);
-    sums[g_p] += dot(convert<Sum>(g), wide);
+    sums[g_p] += dot(load3<Sum>(preconditioned.gradient, i), wide);
     sums[p_p] += pp;
     sums[p_M_p] += Sum(mass(i)) * pp;
   }
