@@ -186,6 +186,8 @@ public:
   void add_to(Matrix const& matrix, Positions const& x, double scale,
               FixedMask<Space> const& fixed) const;
 
+  static constexpr double margin = kernels::inversion_margin;
+
   double max_step(Positions const& x, Vectors const& p, double at_most) const {
     if constexpr (Material::allows_inversion) {
       return at_most;
@@ -194,7 +196,7 @@ public:
     }
   }
   double max_step(Positions const& x, Vectors const& p, double at_most, double certified) const {
-    return at_most <= certified ? at_most : max_step(x, p, at_most);
+    return at_most <= margin * certified ? at_most : max_step(x, p, at_most);
   }
   double max_prescribed_step(Positions const& x, Vectors const& p, double at_most) const {
     return step_to_inversion(x, p, at_most, !Material::allows_inversion);
@@ -240,8 +242,10 @@ private:
   double step_to_inversion(Positions const& x, Vectors const& p, double at_most,
                            bool strict) const {
     using Kernel_ = kernels::ParticleInversion<Space, Precision, Material, K, packed_>;
-    run("particle_max_step", Kernel_{frame(x), p, at_most, strict, bounds_});
-    return smallest_bound(at_most);
+    return kernels::step_with_margin(at_most, [&](double length) {
+      run("particle_max_step", Kernel_{frame(x), p, length, strict, bounds_});
+      return smallest_bound(length);
+    });
   }
   double smallest_bound(double ceiling) const {
     return minimum<Space>("particle_bound", blocks_.patches, ceiling,

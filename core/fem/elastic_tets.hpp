@@ -91,8 +91,7 @@ public:
   void add_to(Matrix const& matrix, Positions const& x, double scale,
               FixedMask<Space> const& fixed) const;
 
-  /// What is used, at most, of the way to where an element inverts.
-  static constexpr double margin = 0.5;
+  static constexpr double margin = kernels::inversion_margin;
 
   double max_step(Positions const& x, Vectors const& p, double at_most) const {
     if constexpr (Material::allows_inversion) {
@@ -306,10 +305,10 @@ double ElasticTets<Material, Precision, Space>::step_to_inversion(Positions cons
                                                                   Vectors const& p, double at_most,
                                                                   bool strict) const {
   using Kernel = kernels::InversionSweep<Space, Precision>;
-  run("elastic_max_step", Kernel{{patches_}, x, p, at_most / margin, strict, bounds_});
-  // What is certified in full is to come back as it was asked for.
-  double const root = smallest_bound(std::numeric_limits<double>::infinity());
-  return root < at_most / margin ? margin * root : at_most;
+  return kernels::step_with_margin(at_most, [&](double length) {
+    run("elastic_max_step", Kernel{{patches_}, x, p, length, strict, bounds_});
+    return smallest_bound(length);
+  });
 }
 
 template <ElementMaterial Material, class Precision, class Space>

@@ -7,6 +7,18 @@
 
 namespace taut::kernels {
 
+/// What terms that forbid inversion use, at most, of the way to where an element inverts.
+inline constexpr double inversion_margin = 0.5;
+
+/// The step that they agree to, of `at_most`: `first(t)` is the length of the first inversion, or
+/// anything from t on if there is none below t.
+template <class First>
+double step_with_margin(double at_most, First const& first) {
+  double const asked = at_most / inversion_margin, length = first(asked);
+  // What is valid in full is to come back as it was asked for.
+  return length < asked ? inversion_margin * length : at_most;
+}
+
 /// A length t such that x + s p certainly inverts no element for |s| <= t, found without roots:
 /// det(F + s dF) > 0 while |s| |F^-1 dF| < 1, and F^-1 dF = C' dF / J with the cofactor C. Zero
 /// where an element is so flat that round-off counts, or where anything is not a number. All in
