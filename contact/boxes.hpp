@@ -130,11 +130,7 @@ KOKKOS_INLINE_FUNCTION void extend_axis(Bounds& b, int c, double x, double error
 
 template <class S, class Cloud>
 Bounds find_bounds(char const* name, int n, Cloud const& cloud) {
-  Bounds bounds;
-  FindBounds<Cloud> const find{cloud};
-  Kokkos::parallel_reduce(
-      label(name), Kokkos::RangePolicy<typename S::execution>(S::instance(), 0, n), find, bounds);
-  return bounds;
+  return join_all<S>(name, n, FindBounds<Cloud>{cloud});
 }
 
 }  // namespace kernels

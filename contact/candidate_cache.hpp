@@ -275,12 +275,7 @@ private:
   void lower_clearance(CandidateList<kind, Space> const& list) {
     if (list.count() == 0) return;
     kernels::LeastClearance<Space> const find{list.distance(), list.activation()};
-    Displacement least;
-    Kokkos::parallel_reduce(
-        label("candidate_clearance"),
-        Kokkos::RangePolicy<typename Space::execution>(Space::instance(), 0, list.count()), find,
-        least);
-    find.join(clear_for_, least);
+    find.join(clear_for_, join_all<Space>("candidate_clearance", list.count(), find));
   }
 
   PairSearch<Policy> search_;

@@ -189,11 +189,8 @@ public:
     using Cloud = kernels::DisplacementCloud<Precision, S>;
     for_each<S>("displacement_chunks", static_cast<int>(bounds_.extent(0)),
                 kernels::ChunkBounds<S, Cloud>{{motion, since}, vertex_, chunk_, bounds_});
-    kernels::BodyBounds result;
-    kernels::FindBodyBounds<S> const find{bounds_, body_};
-    Kokkos::parallel_reduce(label("displacement_bodies"),
-                            Kokkos::RangePolicy<typename S::execution>(S::instance(), 0, bodies),
-                            find, result);
+    auto const result =
+        join_all<S>("displacement_bodies", bodies, kernels::FindBodyBounds<S>{bounds_, body_});
     refuse_stray(result.bounds.all);
     return {{result.longest, kernels::diagonal(result.bounds.all)},
             {result.longest_off, kernels::diagonal(result.bounds.off)}};

@@ -340,10 +340,10 @@ private:
     }
 
     void enter(Positions const& x) {
-      BoundedStep const worst = kernels::bound_each<Space>(
-          "obstacle_enter", vertices(),
-          kernels::EnterObstacle<Table>{
-              {Kokkos::Experimental::infinity_v<double>}, table, x, anew});
+      BoundedStep const worst =
+          join_all<Space>("obstacle_enter", vertices(),
+                          kernels::EnterObstacle<Table>{
+                              {Kokkos::Experimental::infinity_v<double>}, table, x, anew});
       if (!(worst.alpha > 0)) refuse(vertex_of(worst), x);
       anew = false;
     }
@@ -369,9 +369,9 @@ private:
     double bound(FaceMotion const& motion, Positions const& x, Vectors const& p, double at_most) {
       limiting.reset();
       if (!(at_most > 0)) return at_most;
-      BoundedStep const step = kernels::bound_each<Space>(
-          "obstacle_bound", vertices(),
-          kernels::BoundFaces<Table>{{at_most}, table, clearance, motion, x, p});
+      BoundedStep const step =
+          join_all<Space>("obstacle_bound", vertices(),
+                          kernels::BoundFaces<Table>{{at_most}, table, clearance, motion, x, p});
       if (step.pair < 0) return at_most;
       if (step.alpha < 0) {
         throw Error(

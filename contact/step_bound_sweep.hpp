@@ -196,18 +196,6 @@ inline void check_clearance(Clearance const& clearance, double at_most) {
   }
 }
 
-template <class S, class Functor>
-BoundedStep bound_each(char const* name, int n, Functor const& functor) {
-  BoundedStep result;
-  functor.init(result);
-  if (n > 0) {
-    Kokkos::parallel_reduce(label(name),
-                            Kokkos::RangePolicy<typename S::execution>(S::instance(), 0, n),
-                            functor, result);
-  }
-  return result;
-}
-
 }  // namespace kernels
 
 /// The largest alpha in (0, at_most] that `bound` certifies for the first n pairs of a list, from
@@ -222,9 +210,9 @@ BoundedStep bound_step(Bound const& bound, Clearance const& clearance, PairList<
                        VectorField<typename Precision::real, S> const& p, double at_most,
                        FoundDistances<S> const& found = {}) {
   kernels::check_clearance(clearance, at_most);
-  return kernels::bound_each<S>("contact_step_bound", n,
-                                kernels::BoundPairs<Precision, S, kind, Bound>{
-                                    {at_most}, bound, clearance, pairs, x, p, found});
+  return join_all<S>("contact_step_bound", n,
+                     kernels::BoundPairs<Precision, S, kind, Bound>{
+                         {at_most}, bound, clearance, pairs, x, p, found});
 }
 
 /// The same for each vertex by itself: lowers alpha(v) of the vertices of each pair. Returns the
@@ -235,9 +223,9 @@ BoundedStep bound_vertices(Bound const& bound, Clearance const& clearance, PairL
                            VectorField<typename Precision::real, S> const& p, double at_most,
                            Array<typename Precision::position, S> const& alpha) {
   kernels::check_clearance(clearance, at_most);
-  return kernels::bound_each<S>("contact_vertex_bound", n,
-                                kernels::BoundVertices<Precision, S, kind, Bound>{
-                                    {at_most}, bound, clearance, pairs, x, p, alpha});
+  return join_all<S>("contact_vertex_bound", n,
+                     kernels::BoundVertices<Precision, S, kind, Bound>{
+                         {at_most}, bound, clearance, pairs, x, p, alpha});
 }
 
 /// How far the step p from x may go, in [0, at_most], while pairs that were `radius` apart or more

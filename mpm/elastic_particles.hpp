@@ -226,10 +226,7 @@ private:
   }
   template <class Kernel_>
   void run(char const* name, Kernel_ const& kernel) const {
-    if (blocks_.patches == 0) return;
-    typename Space::team_policy policy(Space::instance(), blocks_.patches, team_size_);
-    policy.set_scratch_size(0, Kokkos::PerTeam(static_cast<int>(kernel.scratch_bytes())));
-    Kokkos::parallel_for(label(name), policy, kernel);
+    for_each_team<Space>(name, blocks_.patches, team_size_, kernel.scratch_bytes(), kernel);
   }
   template <kernels::Measure what>
   double measured(char const* name, Positions const& x, Vectors const& p, double alpha) const {

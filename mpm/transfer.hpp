@@ -307,12 +307,9 @@ public:
     velocity_ = velocity_memory_.resize("node_velocity", nodes);
     grow(partial_, "transfer_partial",
          std::size_t(4) * BlockViews<K, Space>::nodes * views.patches);
-    if (views.patches > 0) {
-      kernels::ToGrid<Space, Precision, K> const kernel{{views}, {particles, dx}, partial_};
-      typename Space::team_policy policy(Space::instance(), views.patches, Space::on_host ? 1 : 64);
-      policy.set_scratch_size(0, Kokkos::PerTeam(static_cast<int>(kernel.scratch_bytes())));
-      Kokkos::parallel_for(label("particles_to_grid"), policy, kernel);
-    }
+    kernels::ToGrid<Space, Precision, K> const kernel{{views}, {particles, dx}, partial_};
+    for_each_team<Space>("particles_to_grid", views.patches, Space::on_host ? 1 : 64,
+                         kernel.scratch_bytes(), kernel);
     using Write = kernels::WriteNodes<Space, Scalar>;
     for_each<Space>(
         "gather_nodes", nodes,

@@ -22,14 +22,12 @@ std::vector<ContactRow> measure_contact(ContactBenchOptions const& options,
     ContactScene const scene(contacts);
     std::size_t const first = rows.size();
     for (std::string const& precision : options.precisions) {
-      if (precision == "fp32") {
-        measure_contact_scene<Fp32>(scene, options, machine, rows);
-      } else if (precision == "mixed") {
+      if (precision == "mixed") {
         measure_contact_scene<Mixed>(scene, options, machine, rows);
       } else if (precision == "fp64") {
         measure_contact_scene<Fp64>(scene, options, machine, rows);
       } else {
-        throw Error("--precisions {}: choose of fp32, mixed and fp64", precision);
+        throw Error("--precisions {}: choose of mixed and fp64", precision);
       }
     }
     for (std::size_t k = first; k < rows.size(); ++k) rows[k].asked = contacts;
@@ -81,7 +79,7 @@ std::vector<ContactRow> contact_rows(std::string const& json) {
 namespace {
 
 void check_options(ContactBenchOptions const& options) {
-  require_known("--precisions", options.precisions, {"fp32", "mixed", "fp64"});
+  require_known("--precisions", options.precisions, {"mixed", "fp64"});
   for (int contacts : options.contacts)
     if (contacts < 100 || contacts > 10'000'000)
       throw Error("--contacts {}: it must be 100 to 10000000", contacts);

@@ -6,7 +6,7 @@
 // `FreeReducer` is the opt-out: it leaves the order to Kokkos.
 #pragma once
 
-#include <taut/core/exec/space.hpp>
+#include <taut/core/exec/host_loop.hpp>
 #include <taut/core/report/error.hpp>
 
 #include <functional>
@@ -31,8 +31,29 @@ inline std::string const& label(std::string_view name) {
 /// Calls `functor(i)` for i in [0, n).
 template <class S, class Functor>
 void for_each(char const* name, int n, Functor const& functor) {
-  Kokkos::parallel_for(label(name), Kokkos::RangePolicy<typename S::execution>(S::instance(), 0, n),
-                       functor);
+  if constexpr (S::on_host) {
+    kernels::host_loop(S::instance(), label(name), n, kernels::run_range<Functor>, &functor);
+  } else {
+    Kokkos::parallel_for(label(name),
+                         Kokkos::RangePolicy<typename S::execution>(S::instance(), 0, n), functor);
+  }
+}
+
+/// Calls `functor(team)` for `teams` teams of `team_size` threads, each with `scratch` bytes of its
+/// own (level 0).
+template <class S, class Functor>
+void for_each_team(char const* name, int teams, int team_size, std::size_t scratch,
+                   Functor const& functor) {
+  if (teams == 0) return;
+  typename S::team_policy policy(S::instance(), teams, team_size);
+  if (scratch > 0) policy.set_scratch_size(0, Kokkos::PerTeam(static_cast<int>(scratch)));
+  if constexpr (S::on_host) {
+    using Execution = typename S::execution;
+    kernels::host_team_loop<Execution>(policy, label(name), kernels::run_team<Execution, Functor>,
+                                       &functor);
+  } else {
+    Kokkos::parallel_for(label(name), policy, functor);
+  }
 }
 
 namespace kernels {
@@ -52,43 +73,57 @@ struct FoldRun {
   }
 };
 
-/// What `functor(i, value)` makes of `start` over [0, n), in an order that is free: `Join` is the
-/// reducer of Kokkos that puts two values together. On the host in up to `runs` runs on the stack:
-/// Kokkos would make a string for the name of a fence in each reduction.
-template <class S, template <class, class> class Join, class T, class Functor>
-T fold(char const* name, int n, T start, Functor const& functor) {
-  Join<T, Kokkos::HostSpace> const result(start);
-  if constexpr (S::on_host) {
-    constexpr int runs = 256;
-    T part[runs];
-    int const length = n / runs + 1, count = n / length + (n % length > 0);
-    for_each<S>(name, count, FoldRun<T, Functor>{functor, start, part, n, length});
-    S::instance().fence(label(name));
-    for (int r = 0; r < count; ++r) result.join(start, part[r]);
-  } else if (n > 0) {
-    T folded;
-    Kokkos::parallel_reduce(
-        label(name), Kokkos::RangePolicy<typename S::execution>(S::instance(), 0, n), functor,
-        Join<T, Kokkos::HostSpace>(Kokkos::View<T, Kokkos::HostSpace>(&folded)));
-    S::instance().fence(label(name));
-    result.join(start, folded);
+/// A functor that raises or lowers a number, as one of `join_all`.
+template <class T, class Functor, bool largest>
+struct Extreme {
+  using value_type = T;
+  Functor functor;
+  T start;
+  KOKKOS_FUNCTION void operator()(int i, T& value) const { functor(i, value); }
+  KOKKOS_FUNCTION void init(T& value) const { value = start; }
+  KOKKOS_FUNCTION void join(T& to, T const& from) const {
+    if (largest ? to < from : from < to) to = from;
   }
-  return start;
-}
+};
 
 }  // namespace kernels
+
+/// What a functor of Kokkos's form (value_type, init, join, `functor(i, value)`) makes of [0, n),
+/// where the order of its joins is free. Waits for it. On the host in up to `runs` runs on the
+/// stack: Kokkos would make a string for the name of a fence in each reduction.
+template <class S, class Functor>
+typename Functor::value_type join_all(char const* name, int n, Functor const& functor) {
+  using T = typename Functor::value_type;
+  T result;
+  functor.init(result);
+  if (n <= 0) return result;
+  if constexpr (S::on_host) {
+    constexpr int runs = sizeof(T) > 64 ? 64 : 256;
+    T part[runs];
+    int const length = n / runs + 1, count = n / length + (n % length > 0);
+    for_each<S>(name, count, kernels::FoldRun<T, Functor>{functor, result, part, n, length});
+    S::instance().fence(label(name));
+    for (int r = 0; r < count; ++r) functor.join(result, part[r]);
+  } else {
+    Kokkos::parallel_reduce(label(name),
+                            Kokkos::RangePolicy<typename S::execution>(S::instance(), 0, n),
+                            functor, result);
+    S::instance().fence(label(name));
+  }
+  return result;
+}
 
 /// Calls `functor(i, largest)` for i in [0, n), where `functor` raises `largest`; returns it, or
 /// `floor` if n = 0. A maximum is exact, so its order is free.
 template <class S, class T, class Functor>
 T maximum(char const* name, int n, T floor, Functor const& functor) {
-  return kernels::fold<S, Kokkos::Max>(name, n, floor, functor);
+  return join_all<S>(name, n, kernels::Extreme<T, Functor, true>{functor, floor});
 }
 
 /// As `maximum`, for the smallest.
 template <class S, class T, class Functor>
 T minimum(char const* name, int n, T ceiling, Functor const& functor) {
-  return kernels::fold<S, Kokkos::Min>(name, n, ceiling, functor);
+  return join_all<S>(name, n, kernels::Extreme<T, Functor, false>{functor, ceiling});
 }
 
 /// K sums that are accumulated side by side.

@@ -24,6 +24,15 @@ struct ExclusiveScan {
   }
 };
 
+/// The same over a range of iterations.
+template <class T, class View, class Functor>
+void scan_range(void const* functor, int first, int last, std::int64_t& sum, bool write) {
+  auto const& scan = *static_cast<ExclusiveScan<T, View, Functor> const*>(functor);
+  T upto = static_cast<T>(sum);
+  for (int i = first; i < last; ++i) scan(i, upto, write);
+  sum = upto;
+}
+
 template <class View>
 struct ReadEntry {
   View from;
@@ -37,13 +46,20 @@ struct ReadEntry {
 template <class S, class T, class Functor>
 requires std::integral<T> T exclusive_scan(char const* name, int n, Functor const& functor,
                                            Kokkos::View<T*, typename S::memory> const& to) {
-  T total = 0;
-  if (n == 0) return total;
-  using Scan = kernels::ExclusiveScan<T, Kokkos::View<T*, typename S::memory>, Functor>;
-  Kokkos::parallel_scan(label(name),
-                        Kokkos::RangePolicy<typename S::execution>(S::instance(), 0, n),
-                        Scan{functor, to}, total);
-  return total;
+  using View = Kokkos::View<T*, typename S::memory>;
+  kernels::ExclusiveScan<T, View, Functor> const scan{functor, to};
+  if constexpr (S::on_host) {
+    return static_cast<T>(kernels::host_scan(S::instance(), label(name), n,
+                                             kernels::scan_range<T, View, Functor>, &scan));
+  } else {
+    T total = 0;
+    if (n > 0) {
+      Kokkos::parallel_scan(label(name),
+                            Kokkos::RangePolicy<typename S::execution>(S::instance(), 0, n), scan,
+                            total);
+    }
+    return total;
+  }
 }
 
 /// The same over the entries of `values`, in place.

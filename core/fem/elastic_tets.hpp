@@ -144,16 +144,10 @@ private:
             {patches_}, materials_, x, p, static_cast<Real>(alpha), reducer_.partials(), bounds_});
   }
 
-  typename Space::team_policy policy(std::size_t scratch_bytes) const {
-    int const team = params_.team_size > 0 ? params_.team_size : (Space::on_host ? 1 : 128);
-    typename Space::team_policy p(Space::instance(), patches_.count, team);
-    if (scratch_bytes > 0) p.set_scratch_size(0, Kokkos::PerTeam(static_cast<int>(scratch_bytes)));
-    return p;
-  }
   template <class Kernel>
   void run(char const* name, Kernel const& kernel) const {
-    if (patches_.count == 0) return;
-    Kokkos::parallel_for(label(name), policy(kernel.scratch_bytes()), kernel);
+    int const team = params_.team_size > 0 ? params_.team_size : (Space::on_host ? 1 : 128);
+    for_each_team<Space>(name, patches_.count, team, kernel.scratch_bytes(), kernel);
   }
 
   /// Rows of `numbers` for the vertices that patches share; grow when first asked for, then stay.

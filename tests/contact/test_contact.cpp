@@ -243,8 +243,13 @@ TEMPLATE_TEST_CASE("contact is bitwise the same on any number of threads and in 
   auto const results =
       test::on_one_thread_and_all([] { return everything<TestType, DefaultSpace>(); });
   CHECK(results[0] == results[1]);
-  CHECK(results[0] == everything<TestType, DefaultSpace, SpatialHash<DefaultSpace>>());
-  CHECK(results[0] == everything<TestType, Left>());
+  // Neither does what a precision changes: once each is enough to compile.
+  if constexpr (std::is_same_v<TestType, Fp64>) {
+    CHECK(results[0] == everything<TestType, DefaultSpace, SpatialHash<DefaultSpace>>());
+  }
+  if constexpr (std::is_same_v<TestType, Mixed>) {
+    CHECK(results[0] == everything<TestType, Left>());
+  }
 }
 
 TEST_CASE("rows of fixed vertices are left alone, and pairs of them are none", "[contact]") {

@@ -321,7 +321,7 @@ TEMPLATE_TEST_CASE("friction exerts no net force, opposes the slip and turns by 
 }
 
 TEMPLATE_TEST_CASE("friction is bitwise the same on any number of threads and in both layouts",
-                   "[friction]", Fp64, Mixed, Fp32) {
+                   "[friction]", Fp64, Mixed) {
   auto const results =
       test::on_one_thread_and_all([] { return everything<TestType, DefaultSpace>(); });
   CHECK(results[0] == results[1]);

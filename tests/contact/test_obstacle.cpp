@@ -135,8 +135,7 @@ TEST_CASE("an obstacle is a term, chosen at compile time or at run time", "[obst
 TEMPLATE_TEST_CASE("an obstacle is the sum over vertices and faces", "[obstacle]",
                    (std::tuple<HalfSpace, Fp64>), (std::tuple<InsideBall, Fp64>),
                    (std::tuple<InsideBox, Fp64>), (std::tuple<InsideCylinder, Fp64>),
-                   (std::tuple<InsideBox, Mixed>), (std::tuple<InsideCylinder, Mixed>),
-                   (std::tuple<HalfSpace, Fp32>), (std::tuple<InsideCylinder, Fp32>)) {
+                   (std::tuple<InsideCylinder, Mixed>), (std::tuple<InsideCylinder, Fp32>)) {
   using Shape = std::tuple_element_t<0, TestType>;
   using Precision = std::tuple_element_t<1, TestType>;
   Fixture<Shape, Precision> f;
@@ -240,21 +239,19 @@ TEMPLATE_TEST_CASE("energy, gradient and curvature of an obstacle belong togethe
 }
 
 TEMPLATE_TEST_CASE("an obstacle is bitwise the same on any number of threads and in both layouts",
-                   "[obstacle]", Fp64, Mixed, Fp32) {
-  auto const check = [](auto results, auto const& left) {
-    CHECK(results[0] == results[1]);
-    CHECK(results[0] == left);
-  };
-  check(test::on_one_thread_and_all([] { return everything<InsideBox, TestType, DefaultSpace>(); }),
-        everything<InsideBox, TestType, Left>());
-  check(test::on_one_thread_and_all(
-            [] { return everything<InsideCylinder, TestType, DefaultSpace>(); }),
-        everything<InsideCylinder, TestType, Left>());
+                   "[obstacle]", (std::tuple<InsideBox, Fp64>), (std::tuple<InsideCylinder, Mixed>),
+                   (std::tuple<InsideCylinder, Fp32>)) {
+  using Shape = std::tuple_element_t<0, TestType>;
+  using Precision = std::tuple_element_t<1, TestType>;
+  auto const results =
+      test::on_one_thread_and_all([] { return everything<Shape, Precision, DefaultSpace>(); });
+  CHECK(results[0] == results[1]);
+  CHECK(results[0] == everything<Shape, Precision, Left>());
 }
 
 TEMPLATE_TEST_CASE("no step that an obstacle allows leaves it", "[obstacle]",
-                   (std::tuple<HalfSpace, Mixed>), (std::tuple<InsideBall, Fp64>),
-                   (std::tuple<InsideBox, Fp32>), (std::tuple<InsideCylinder, Mixed>),
+                   (std::tuple<HalfSpace, Fp64>), (std::tuple<InsideBall, Fp64>),
+                   (std::tuple<InsideBox, Fp64>), (std::tuple<InsideCylinder, Mixed>),
                    (std::tuple<InsideCylinder, Fp32>)) {
   using Shape = std::tuple_element_t<0, TestType>;
   using Precision = std::tuple_element_t<1, TestType>;
