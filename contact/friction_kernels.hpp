@@ -121,7 +121,7 @@ struct EvaluateFriction {
     Real const limit = slips.contacts.limit(k);
     for (int i = 0; i < 3; ++i) to.force(k, i) = limit * s.slope_ratio * s.r[i];
     if constexpr (curvature) {
-      auto const h = friction_hessian(s, slips.contacts.normal_of(k));
+      auto const h = friction_curvature(s, slips.contacts.normal_of(k));
       auto const stiffness = static_cast<Real>(double(limit) / slips.length);
       for (int i = 0; i < 6; ++i) to.block(k, i) = stiffness * h.s[i];
     }
@@ -152,7 +152,7 @@ struct FrictionForm {
   [[gnu::noinline]] KOKKOS_FUNCTION double form(int k) const {
     auto const s = evaluate_slip(slips.slip(k, x));
     Vec3<Real> const q = slips.tangential(k, slips.combine(k, p), 1);
-    return double(slips.contacts.limit(k)) / slips.length * double(friction_form(s, q));
+    return double(slips.contacts.limit(k)) / slips.length * double(s.slope_ratio * dot(q, q));
   }
   KOKKOS_FUNCTION void operator()(int k, Sums<double, 1>& sum) const { sum[0] += form(k); }
 };
@@ -175,9 +175,8 @@ struct FrictionProduct {
       for (int i = 0; i < 3; ++i) w[i] += ca * double(p(v, i));
     }
     auto const s = evaluate_slip(slips.slip(k, x));
-    auto const h = friction_hessian(s, slips.contacts.normal_of(k));
     auto const stiffness = static_cast<Real>(double(slips.contacts.limit(k)) / slips.length);
-    Vec3<Real> const hw = stiffness * (h * slips.tangential(k, w, 1));
+    Vec3<Real> const hw = stiffness * (s.slope_ratio * slips.tangential(k, w, 1));
     for (int i = 0; i < 3; ++i) to.force(k, i) = hw[i];
   }
   KOKKOS_FUNCTION void operator()(int k) const { multiply(k); }

@@ -8,13 +8,19 @@
 //          y - 1 / 3,              1            beyond.
 //
 // The force -L f'(y) u / |u| is that of Coulomb where the contact slips faster than eps_v; what
-// sticks creeps: a load of t L is held at y = 1 - sqrt(1 - t). f is convex and grows with y, so the
-// Hessian
+// sticks creeps: a load of t L is held at y = 1 - sqrt(1 - t).
 //
-//   L / e (f'/y (P - r r' / y^2) + f'' r r' / y^2),   r = u / e,   P = 1 - n n',
+// The curvature is not that of D but of the paraboloid which touches D at u and lies above it
+// everywhere, for f is a concave function of y^2:
 //
-// is positive semi-definite as it is. All is computed from r, so that no length, however small,
-// leaves the range of fp32.
+//   L / e f'/y P,   P = 1 - n n'.
+//
+// Across the slip it is the Hessian of D; along it that one, L / e f'', is nil as soon as a contact
+// slides, and a step that stops or turns a slip is then far too long. With the paraboloid no step
+// is: a house of cards that starts in contact takes nonlinear CG 15 to 30 % fewer iterations, and
+// Newton 7 instead of 26; a block that slides 5 instead of 8, and 1.4 instead of 5. Newton's
+// last digits come linearly: 34 iterations instead of 11 to a tolerance of 1e-7.
+// All is computed from r = u / e, so that no length, however small, leaves the range of fp32.
 #pragma once
 
 #include <taut/core/math/matrix.hpp>
@@ -26,21 +32,15 @@ template <class T>
 struct Slip {
   Vec3<T> r;
   T y;            ///< |r|
-  T slope_ratio;  ///< f'(y) / y
-  T curvature;    ///< f''(y)
+  T slope_ratio;  ///< f'(y) / y, e / L times the curvature
 
   KOKKOS_FUNCTION bool slides() const { return !(y < T(1)); }
-  /// r / y; nil where it makes no difference to the curvature, for there |r|^2 may underflow.
-  KOKKOS_FUNCTION Vec3<T> direction() const {
-    return (y > Kokkos::Experimental::epsilon_v<T> ? T(1) / y : T(0)) * r;
-  }
 };
 
 template <class T>
 KOKKOS_INLINE_FUNCTION Slip<T> evaluate_slip(Vec3<T> const& r) {
   T const y = norm(r);
-  bool const sticks = y < T(1);
-  return {r, y, sticks ? T(2) - y : T(1) / y, sticks ? T(2) * (T(1) - y) : T(0)};
+  return {r, y, y < T(1) ? T(2) - y : T(1) / y};
 }
 
 /// f(y)
@@ -65,24 +65,12 @@ KOKKOS_INLINE_FUNCTION T friction_energy_change(Vec3<T> const& before, Vec3<T> c
   return dy + (room1 * square(room1) - room0 * square(room0)) / T(3);
 }
 
-/// p' H p of e / L times the Hessian, for p normal to n.
+/// e / L times the curvature, for contacts of unit normal n.
 template <class T>
-KOKKOS_INLINE_FUNCTION T friction_form(Slip<T> const& s, Vec3<T> const& p) {
-  Vec3<T> const w = s.direction();
-  T const along = dot(w, p);
-  Vec3<T> const across = p - along * w;
-  return s.slope_ratio * dot(across, across) + s.curvature * square(along);
-}
-
-/// e / L times the Hessian, for contacts of unit normal n.
-template <class T>
-KOKKOS_INLINE_FUNCTION Sym3<T> friction_hessian(Slip<T> const& s, Vec3<T> const& n) {
-  Vec3<T> const w = s.direction();
-  T const h = s.slope_ratio, along = s.curvature - h;
-  return {{h * (T(1) - square(n[0])) + along * square(w[0]),
-           h * (T(1) - square(n[1])) + along * square(w[1]),
-           h * (T(1) - square(n[2])) + along * square(w[2]), along * w[0] * w[1] - h * n[0] * n[1],
-           along * w[1] * w[2] - h * n[1] * n[2], along * w[0] * w[2] - h * n[0] * n[2]}};
+KOKKOS_INLINE_FUNCTION Sym3<T> friction_curvature(Slip<T> const& s, Vec3<T> const& n) {
+  T const h = s.slope_ratio;
+  return {{h * (T(1) - square(n[0])), h * (T(1) - square(n[1])), h * (T(1) - square(n[2])),
+           -h * n[0] * n[1], -h * n[1] * n[2], -h * n[0] * n[2]}};
 }
 
 }  // namespace taut

@@ -10,8 +10,8 @@ struct FrictionOracle {
   double energy = 0, work = 0;
   int contacts = 0, sliding = 0;
   std::vector<Point> gradient;
-  std::vector<double> hessian;  ///< 3n x 3n, by rows
-  Vec3<double> moment{};        ///< Sum t x force over pairs, t the gap at the lag point
+  std::vector<double> curvature;  ///< 3n x 3n, by rows
+  Vec3<double> moment{};          ///< Sum t x force over pairs, t the gap at the lag point
 
   /// Contacts at `lag`, slip from `from` to x, of pairs as in Oracle; `mu(a, b)` of objects.
   template <class Mu>
@@ -19,7 +19,7 @@ struct FrictionOracle {
                  std::vector<Point> const& lag, std::vector<Point> const& from,
                  std::vector<Point> const& x, double dhat, double cap, double pressure,
                  double length, Mu const& mu)
-      : gradient(x.size()), hessian(9 * x.size() * x.size()), length_(length) {
+      : gradient(x.size()), curvature(9 * x.size() * x.size()), length_(length) {
     std::vector<double> const area = vertex_areas(surface, rest);
     soups::all_pairs(surface, [&](soups::Pair const& pair) {
       auto const& v = pair.v;
@@ -59,17 +59,12 @@ private:
     // f0 less its value at rest, e / 3.
     energy += limit * (sticks ? -y * y * y / (3 * e * e) + y * y / e : y - e / 3);
     double const f1 = sticks ? -y * y / (e * e) + 2 * y / e : 1;
-    double const f2 = sticks ? -2 * y / (e * e) + 2 / e : 0;
     sliding += !sticks;
     work += limit * f1 * y;
     double force[2], h[2][2];
     for (int i = 0; i < 2; ++i) {
       force[i] = y > 0 ? limit * f1 * u[i] / y : 0;
-      for (int j = 0; j < 2; ++j) {
-        double const id = i == j;
-        h[i][j] = y > 0 ? limit * (f1 / y * id + (f2 / (y * y) - f1 / (y * y * y)) * u[i] * u[j])
-                        : limit * 2 / e * id;
-      }
+      for (int j = 0; j < 2; ++j) h[i][j] = i == j ? limit * (y > 0 ? f1 / y : 2 / e) : 0;
     }
     Vec3<double> const f = force[0] * basis[0] + force[1] * basis[1];
     moment = moment + cross(s.at.t, f);
@@ -82,7 +77,8 @@ private:
             double sum = 0;
             for (int k = 0; k < 2; ++k)
               for (int l = 0; l < 2; ++l) sum += basis[k][i] * h[k][l] * basis[l][j];
-            hessian[3 * n * (3 * pair.v[a] + i) + 3 * pair.v[b] + j] += s.at.c[a] * s.at.c[b] * sum;
+            curvature[3 * n * (3 * pair.v[a] + i) + 3 * pair.v[b] + j] +=
+                s.at.c[a] * s.at.c[b] * sum;
           }
       }
   }

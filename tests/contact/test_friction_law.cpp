@@ -40,8 +40,6 @@ TEST_CASE("the law is Coulomb's beyond the smoothing, and once differentiable ac
     double const step = 1e-6 * y;
     double const difference = (friction_energy(y + step) - friction_energy(y - step)) / (2 * step);
     CHECK_THAT(slope(y), WithinRel(difference, 1e-8));
-    double const curvature = (slope(y + step) - slope(y - step)) / (2 * step);
-    CHECK_THAT(evaluate_slip(Vec3<double>{0, y, 0}).curvature, WithinAbs(curvature, 1e-8));
   }
   CHECK(friction_energy(0.0) == 0);
   CHECK(slope(0) == 0);
@@ -98,7 +96,35 @@ TEMPLATE_TEST_CASE("changes of energy have errors relative to themselves", "[fri
   CHECK(worst < 8 * double(std::numeric_limits<T>::epsilon()));
 }
 
-TEMPLATE_TEST_CASE("form and Hessian are one, and positive semi-definite", "[friction]", double,
+TEST_CASE("the paraboloid of the curvature touches the law and lies above it everywhere",
+          "[friction]") {
+  std::mt19937 random(6);
+  std::uniform_real_distribution<double> exponent(-6, 3);
+  for (int trial = 0; trial < 20000; ++trial) {
+    Vec3<double> const n = random_direction(random);
+    auto const in_plane = [&](double length) {
+      Vec3<double> const v = cross(n, random_direction(random));
+      return (length / norm(v)) * v;
+    };
+    double const y = trial % 50 == 0 ? 0 : std::pow(10, exponent(random));
+    Vec3<double> const r = in_plane(y), p = in_plane(std::pow(10, exponent(random)));
+    auto const s = evaluate_slip(r);
+    double const form = quadratic(friction_curvature(s, n), p);
+    double const model = s.slope_ratio * dot(r, p) + form / 2;
+    double const change = friction_energy_change(r, r + p, p);
+    CAPTURE(y, trial);
+    CHECK(form > 0);
+    CHECK(change <= model + 1e-12 * (std::abs(model) + form));
+    // Across the slip it is the Hessian, and at rest all of it.
+    Vec3<double> const side = y > 0 ? cross(n, (1 / y) * r) : in_plane(1);
+    double const step = 1e-3 * std::min(y > 0 ? y : 1e-3, 1e3);
+    double const both = friction_energy_change(r, r + step * side, step * side) +
+                        friction_energy_change(r, r - step * side, -step * side);
+    CHECK_THAT(both, WithinRel(square(step) * quadratic(friction_curvature(s, n), side), 1e-3));
+  }
+}
+
+TEMPLATE_TEST_CASE("the curvature of friction leaves the normal alone", "[friction]", double,
                    float) {
   using T = TestType;
   double const tolerance = 64 * double(std::numeric_limits<T>::epsilon());
@@ -108,25 +134,17 @@ TEMPLATE_TEST_CASE("form and Hessian are one, and positive semi-definite", "[fri
     Vec3<double> const n = random_direction(random);
     Vec3<double> const across = cross(n, random_direction(random));
     double const y = trial % 50 == 0 ? 0 : std::pow(10, exponent(random));
-    Vec3<double> const r = (y / norm(across)) * across;
-    Vec3<double> p = random_direction(random);
-    p = p - dot(n, p) * n;
-    Vec3<T> nt, rt, pt;
-    for (int c = 0; c < 3; ++c) nt[c] = T(n[c]), rt[c] = T(r[c]), pt[c] = T(p[c]);
-    auto const s = evaluate_slip(rt);
-    Sym3<T> const h = friction_hessian(s, nt);
-    double const size = double(s.slope_ratio);
-    double const form = double(friction_form(s, pt));
-    CAPTURE(y, trial);
-    CHECK(form >= 0);
-    CHECK_THAT(double(quadratic(h, pt)), WithinAbs(form, tolerance * size));
-    CHECK_THAT(double(quadratic(h, nt)), WithinAbs(0, tolerance * size));
-    // Eigenvalues: f'/y across, f'' along.
-    if (y > 1e-15) {
-      Vec3<T> const along = (T(1) / s.y) * rt, side = cross(nt, along);
-      CHECK_THAT(double(quadratic(h, along)), WithinAbs(double(s.curvature), tolerance * size));
-      CHECK_THAT(double(quadratic(h, side)), WithinAbs(size, tolerance * size));
+    Vec3<T> nt, rt, side;
+    for (int c = 0; c < 3; ++c) {
+      nt[c] = T(n[c]), rt[c] = T(y / norm(across) * across[c]);
+      side[c] = T(across[c] / norm(across));
     }
+    auto const s = evaluate_slip(rt);
+    Sym3<T> const h = friction_curvature(s, nt);
+    double const size = double(s.slope_ratio);
+    CAPTURE(y, trial);
+    CHECK_THAT(double(quadratic(h, nt)), WithinAbs(0, tolerance * size));
+    CHECK_THAT(double(quadratic(h, side)), WithinAbs(size, tolerance * size));
   }
 }
 

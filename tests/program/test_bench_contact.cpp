@@ -108,7 +108,7 @@ TEST_CASE("a row per kernel of contact, size and precision", "[bench]") {
   for (char const* kernel : kernels) {
     CAPTURE(kernel);
     CHECK(std::count_if(rows.begin(), rows.end(),
-                        [&](ContactRow const& row) { return row.kernel == kernel; }) == 6);
+                        [&](ContactRow const& row) { return row.kernel == kernel; }) == 4);
   }
 
   std::vector<ContactRow> const back = contact_rows(to_json(rows));
