@@ -29,7 +29,7 @@ namespace taut {
 
 /// A contact that slips by r = u / e.
 template <class T>
-struct Slip {
+struct SlipState {
   Vec3<T> r;
   T y;            ///< |r|
   T slope_ratio;  ///< f'(y) / y, e / L times the curvature
@@ -38,7 +38,7 @@ struct Slip {
 };
 
 template <class T>
-KOKKOS_INLINE_FUNCTION Slip<T> evaluate_slip(Vec3<T> const& r) {
+KOKKOS_INLINE_FUNCTION SlipState<T> evaluate_slip(Vec3<T> const& r) {
   T const y = norm(r);
   return {r, y, y < T(1) ? T(2) - y : T(1) / y};
 }
@@ -67,7 +67,7 @@ KOKKOS_INLINE_FUNCTION T friction_energy_change(Vec3<T> const& before, Vec3<T> c
 
 /// e / L times the curvature, for contacts of unit normal n.
 template <class T>
-KOKKOS_INLINE_FUNCTION Sym3<T> friction_curvature(Slip<T> const& s, Vec3<T> const& n) {
+KOKKOS_INLINE_FUNCTION Sym3<T> friction_curvature(SlipState<T> const& s, Vec3<T> const& n) {
   T const h = s.slope_ratio;
   return {{h * (T(1) - square(n[0])), h * (T(1) - square(n[1])), h * (T(1) - square(n[2])),
            -h * n[0] * n[1], -h * n[1] * n[2], -h * n[0] * n[2]}};
