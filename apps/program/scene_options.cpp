@@ -11,7 +11,8 @@ std::span<OptionKey const> solver_keys() {
        {},
        {"dk", "dk+", "hz", "hs", "prp", "prp+", "ls", "fr", "cd", "bfgs", "lbfgs", "chebyshev",
         "newton", "gradient"},
-       "the minimiser: nonlinear conjugate gradients by its beta, or another one"},
+       "the minimiser: nonlinear conjugate gradients by its beta, or another one; a scene of "
+       "material points that does not say takes lbfgs"},
       {"precision",
        std::string("fp64"),
        {},
@@ -20,16 +21,19 @@ std::span<OptionKey const> solver_keys() {
       {"preconditioner",
        std::string("auto"),
        {},
-       {"auto", "identity", "jacobi", "block_jacobi", "schwarz_16", "schwarz_32"},
-       "schwarz: dense aggregates of 16 or 32 vertices with a coarse level; auto: schwarz_32 where "
+       {"auto", "identity", "jacobi", "block_jacobi", "schwarz_16", "schwarz_32", "multigrid"},
+       "schwarz: dense aggregates of 16 or 32 vertices with a coarse level, of meshes; multigrid: "
        "a "
-       "step reaches over several elements, otherwise block_jacobi (`taut plan` says why)"},
+       "cycle over the nodes of a grid, of material points; auto: multigrid for these, and for "
+       "meshes schwarz_32 where a step reaches over several elements, otherwise block_jacobi "
+       "(`taut plan` says why)"},
       {"refresh",
        std::string("auto"),
        {},
        {"auto", "always", "lagged", "rare"},
        "when the preconditioner is rebuilt: at each iterate; every refresh_every; the same and "
-       "where the steps collapse; auto: rare for schwarz, always for the others"},
+       "where the steps collapse; auto: rare for schwarz, every 8 iterations for multigrid, always "
+       "for the others"},
       {"refresh_every",
        30,
        {.min = 1, .max = 1e6},
@@ -57,7 +61,8 @@ std::span<OptionKey const> solver_keys() {
        0,
        {.min = 0, .max = 1000},
        {},
-       "decrements summed at least by decrement_window; 0: 8, or 1 for newton"},
+       "decrements summed at least by decrement_window; 0: 8, or 4 with multigrid, or 1 for "
+       "newton"},
       {"max_iterations", 2000, {.min = 1, .max = 1e9}, {}, "budget of a time step"},
       {"history", 8, {.min = 1, .max = max_lbfgs_window}, {}, "pairs kept by lbfgs"},
       {"chebyshev_rho",

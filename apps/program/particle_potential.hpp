@@ -1,0 +1,65 @@
+// The incremental potential of a scene of material points. The terms over the particles are chosen
+// by name, and made anew for the grid of every step (mpm/particle_stepper.hpp tells them).
+#pragma once
+
+#include <taut/core/fem/element_material.hpp>
+#include <taut/core/potential/any_terms.hpp>
+#include <taut/core/potential/potential.hpp>
+#include <taut/materials/elastic.hpp>
+#include <taut/mpm/particle_grid.hpp>
+#include <taut/mpm/slip.hpp>
+
+#include <algorithm>
+#include <functional>
+#include <limits>
+#include <span>
+#include <string_view>
+
+namespace taut {
+
+/// Particles are computed in fp64: they add up over all steps, and one precision compiles once.
+using ParticlePrecision = Fp64;
+using ParticleKernel = QuadraticSpline;
+using ProgramGrid = ParticleGrid<ParticleKernel, ParticlePrecision, DefaultSpace>;
+
+/// Terms over particles behind one type.
+class ParticleTerms : public AnyTerms<ParticlePrecision, DefaultSpace> {
+  using Base = AnyTerms<ParticlePrecision, DefaultSpace>;
+
+public:
+  using Points = Particles<ParticlePrecision, DefaultSpace>;
+  using GridBlocks = ProgramGrid::Blocks;
+
+  template <class Term>
+  void add(Term term) {
+    materials_ = std::min(materials_, term.material_count());
+    told_.push_back([held = Base::add(std::move(term))](
+                        Points const& particles, GridBlocks const& blocks,
+                        GridNodes<DefaultSpace> const& grid,
+                        Positions const& rest) { held->update(particles, blocks, grid, rest); });
+  }
+  int material_count() const { return materials_; }
+  void update(Points const& particles, GridBlocks const& blocks,
+              GridNodes<DefaultSpace> const& grid, Positions const& rest) const {
+    for (auto const& tell : told_) tell(particles, blocks, grid, rest);
+  }
+
+private:
+  int materials_ = std::numeric_limits<int>::max();
+  std::vector<std::function<void(Points const&, GridBlocks const&, GridNodes<DefaultSpace> const&,
+                                 Positions const&)>>
+      told_;
+};
+
+using ParticlePotential = Potential<Inertia<ParticlePrecision>, BodyForce<ParticlePrecision>,
+                                    ParticleTerms, Slip<ParticlePrecision>>;
+
+/// The models that are compiled for particles; the first is the default.
+std::span<std::string_view const> particle_models();
+/// What ParticleBlocks are to be padded to for them.
+int particle_lanes();
+/// Adds the elastic term of a model. Throws Error for one that is not compiled.
+void add_particle_term(ParticleTerms& terms, std::string_view model,
+                       std::vector<Lame<double>> const& materials);
+
+}  // namespace taut
