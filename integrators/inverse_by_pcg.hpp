@@ -10,7 +10,9 @@
 
 namespace taut {
 
-template <class P = Mixed, class S = DefaultSpace>
+/// `Hessian` as in Pcg, with a product that needs no objective.
+template <class P = Mixed, class S = DefaultSpace,
+          template <class, class> class Hessian = AssembledHessian>
 class InverseByPcg {
 public:
   using Vectors = VectorField<typename P::real, S>;
@@ -34,17 +36,15 @@ public:
   LocalMatrices<P, S> const& curvature() const { return jacobi_.curvature(); }
   bool pointwise() const { return false; }
 
-  /// Assembles the Hessian at x.
+  /// Takes the Hessian at x.
   template <class E>
   void update(E& e, VectorField<typename P::position, S> const& x) {
     jacobi_.update(e, x);
-    hessian_.forget();
-    hessian_.at(e, x);
+    hessian_.start(e);
+    hessian_.update(e, x);
   }
   void apply(Vectors const& g, Vectors const& z) const {
-    auto const product = [&](Vectors const& d, Vectors const& hd) {
-      taut::product(hessian_(), d, hd);
-    };
+    auto const product = [&](Vectors const& d, Vectors const& hd) { hessian_.product(d, hd); };
     iterations_ +=
         cg_.solve(product, jacobi_, g, params_.tolerance, params_.max_iterations, z).iterations;
   }
@@ -54,7 +54,7 @@ public:
 private:
   Params params_;
   BlockJacobi<P, S> jacobi_;
-  HessianMatrix<P, S> hessian_;
+  Hessian<P, S> hessian_;
   ConjugateGradients<P, S> cg_;
   mutable int iterations_ = 0;
 };

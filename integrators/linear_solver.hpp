@@ -221,11 +221,15 @@ public:
   void update(E& e, VectorField<typename P::position, S> const& x) {
     matrix_.at(e, x);
   }
+  void product(VectorField<typename P::real, S> const& d,
+               VectorField<typename P::real, S> const& hd) const {
+    taut::product(matrix_(), d, hd);
+  }
   template <class E>
   void product(E&, VectorField<typename P::position, S> const&,
                VectorField<typename P::real, S> const& d,
                VectorField<typename P::real, S> const& hd) const {
-    taut::product(matrix_(), d, hd);
+    product(d, hd);
   }
 
 private:

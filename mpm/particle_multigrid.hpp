@@ -1,14 +1,15 @@
 // The multigrid cycle as a preconditioner of any minimiser over particles, made from these at once:
 // by default without a fine matrix, whose level is smoothed by Chebyshev's polynomial on products
-// with 45 numbers per particle, above coarser levels in float that are assembled from the particles
-// and smoothed by Gauss-Seidel. `assembled`: with the fine matrix, as HOT has it (Wang et al.
-// 2020).
+// with 45 numbers per particle and patches where cells are cut (cut_cells.hpp), above coarser
+// levels in float that are assembled from the particles and smoothed by Gauss-Seidel. `assembled`:
+// with the fine matrix, as HOT has it (Wang et al. 2020).
 //
 // For potentials in which one term holds all particles, and others act on single nodes; where more
 // is coupled GridMultigrid takes the Hessian that the potential assembles.
 #pragma once
 
 #include <taut/core/potential/preconditioning.hpp>
+#include <taut/mpm/cut_cells.hpp>
 #include <taut/mpm/multigrid.hpp>
 #include <taut/mpm/particle_operator.hpp>
 
@@ -36,12 +37,13 @@ public:
   using Operator = ParticleOperator<Kernel, Real, S>;
   static constexpr bool assembled = Policies::assembled;
   using Fine = std::conditional_t<assembled, MatrixLevel<S, Real, Kernel::width - 1>,
-                                  ActionLevel<Operator, S, Real>>;
+                                  PatchedLevel<Operator, S, Real, Kernel::width - 1>>;
   using Cycle = Multigrid<Fine, typename Policies::FineSmoother, typename Policies::Smoother,
                           typename Policies::Embedding, typename Policies::Scalar>;
 
   struct Params {
     Refresh refresh = Refresh::lagged(8);
+    CutCells cut_cells = {};  ///< where there is no fine matrix
     typename Cycle::Params cycle = {};
   };
   static constexpr char const* name = "particle_multigrid";
@@ -64,6 +66,7 @@ public:
       operator_.matrix(fine_.matrix());
     } else {
       fine_.resize(operator_.nodes(), operator_.fixed(), operator_);
+      fine_.set(params_.cut_cells);
     }
     fine_.finish();
     cycle_.build(fine_);

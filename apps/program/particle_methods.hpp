@@ -2,11 +2,13 @@
 // the nodes of a grid, where a multigrid cycle is one more preconditioner.
 #pragma once
 
+#include <taut/apps/program/method_title.hpp>
 #include <taut/apps/program/particle_potential.hpp>
 #include <taut/apps/program/scene_options.hpp>
 #include <taut/integrators/newton.hpp>
 
 #include <memory>
+#include <span>
 
 namespace taut {
 
@@ -41,6 +43,10 @@ public:
 private:
   std::unique_ptr<Interface> minimiser_;
 };
+
+/// The compositions that only scenes of particles have, and their default, in the order in which
+/// they are listed; they take nonlinear CG and newton besides (method_titles).
+std::span<MethodTitle const> particle_method_titles();
 
 /// The preconditioner that a scene of particles takes: never "auto".
 std::string particle_preconditioner(SolverOptions const& options);

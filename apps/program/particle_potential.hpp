@@ -7,6 +7,7 @@
 #include <taut/core/potential/potential.hpp>
 #include <taut/materials/elastic.hpp>
 #include <taut/mpm/particle_grid.hpp>
+#include <taut/mpm/particle_operator.hpp>
 #include <taut/mpm/slip.hpp>
 
 #include <algorithm>
@@ -29,14 +30,20 @@ class ParticleTerms : public AnyTerms<ParticlePrecision, DefaultSpace> {
 public:
   using Points = Particles<ParticlePrecision, DefaultSpace>;
   using GridBlocks = ProgramGrid::Blocks;
+  using Operator = ParticleOperator<ParticleKernel, ParticlePrecision::real, DefaultSpace>;
 
   template <class Term>
   void add(Term term) {
     materials_ = std::min(materials_, term.material_count());
-    told_.push_back([held = Base::add(std::move(term))](
-                        Points const& particles, GridBlocks const& blocks,
-                        GridNodes<DefaultSpace> const& grid,
-                        Positions const& rest) { held->update(particles, blocks, grid, rest); });
+    auto const held = Base::add(std::move(term));
+    told_.push_back([held](Points const& particles, GridBlocks const& blocks,
+                           GridNodes<DefaultSpace> const& grid,
+                           Positions const& rest) { held->update(particles, blocks, grid, rest); });
+    linearised_.push_back(
+        [held](Positions const& x, double scale, Operator& to) { held->linearise(x, scale, to); });
+    measured_.push_back([held](Array<double, DefaultSpace> const& force) {
+      held->add_characteristic_force(force);
+    });
   }
   int material_count() const { return materials_; }
   void update(Points const& particles, GridBlocks const& blocks,
@@ -44,11 +51,27 @@ public:
     for (auto const& tell : told_) tell(particles, blocks, grid, rest);
   }
 
+  /// For preconditioners that are made of particles. Throws Error unless one term holds all.
+  void linearise(Positions const& x, double scale, Operator& to) const {
+    if (linearised_.size() != 1) {
+      throw Error(
+          "{} models over the particles have no operator in common: take solver.preconditioner = "
+          "\"block_jacobi\"",
+          linearised_.size());
+    }
+    linearised_.front()(x, scale, to);
+  }
+  void add_characteristic_force(Array<double, DefaultSpace> const& force) const {
+    for (auto const& add : measured_) add(force);
+  }
+
 private:
   int materials_ = std::numeric_limits<int>::max();
   std::vector<std::function<void(Points const&, GridBlocks const&, GridNodes<DefaultSpace> const&,
                                  Positions const&)>>
       told_;
+  std::vector<std::function<void(Positions const&, double, Operator&)>> linearised_;
+  std::vector<std::function<void(Array<double, DefaultSpace> const&)>> measured_;
 };
 
 using ParticlePotential = Potential<Inertia<ParticlePrecision>, BodyForce<ParticlePrecision>,

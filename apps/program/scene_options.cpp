@@ -9,8 +9,9 @@ std::span<OptionKey const> solver_keys() {
       {"method",
        std::string("dk"),
        {},
-       {"dk", "dk+", "hz", "hs", "prp", "prp+", "ls", "fr", "cd", "bfgs", "lbfgs", "chebyshev",
-        "newton", "gradient"},
+       {"dk",      "dk+",    "hz",        "hs",        "prp",    "prp+",     "ls",  "fr",
+        "cd",      "bfgs",   "lbfgs",     "chebyshev", "newton", "gradient", "hot", "hot_quadratic",
+        "lbfgs_h", "pn_pcg", "pn_pcg_mf", "pn_mgpcg"},
        "the minimiser: nonlinear conjugate gradients by its beta, or another one; a scene of "
        "material points that does not say takes lbfgs"},
       {"precision",
@@ -52,10 +53,10 @@ std::span<OptionKey const> solver_keys() {
       {"stopping",
        std::string("decrement_window"),
        {},
-       {"decrement_window", "energy_drop", "gradient_norm", "budget"},
+       {"decrement_window", "energy_drop", "gradient_norm", "characteristic_norm", "budget"},
        "what ends a step: sum of the last energy decrements below 1/2 M (tolerance L)^2; energy "
-       "drop "
-       "relative to the first; gradient norm relative to the first; max_iterations alone"},
+       "drop relative to the first; gradient norm relative to the first; HOT's norm, of material "
+       "points (its authors take a tolerance of 1e-7); max_iterations alone"},
       {"tolerance", 1e-3, {.min = 0, .max = 1, .open_min = true}, {}, "of the stopping rule"},
       {"window",
        0,

@@ -152,6 +152,83 @@ TEST_CASE("a cycle without a fine matrix is that of the matrix", "[mpm][operator
   CHECK(apart(by_action, by_matrix, l.n) < 1e-11);
 }
 
+TEST_CASE("cut cells are solved with by patches", "[mpm][operator]") {
+  using C = Of<Fp64, test::Right<DefaultSpace>, true>;
+  using S = C::Space;
+  Linearised<C> const l;
+  auto const matrix = l.matrix();
+  GridNodes<S> const& nodes = l.to.nodes();
+  PatchedLevel<Linearised<C>::Operator, S, double> level;
+  level.resize(nodes, l.to.fixed(), l.to);
+  CutCells const params{.ratio = 0.05};
+  level.set(params);
+  level.finish();
+  auto const r = l.vectors(), expected = l.vectors();
+  for (int i = 0; i < l.n; ++i)
+    for (int c = 0; c < 3; ++c) r(i, c) = std::sin(2.0 * i + c);
+
+  // Node k of 27 around i, if it is free.
+  auto const around = [&](int i, int k) {
+    int const j = nodes.node(nodes.ijk(i, 0) + k / 9 - 1, nodes.ijk(i, 1) + k / 3 % 3 - 1,
+                             nodes.ijk(i, 2) + k % 3 - 1);
+    return j >= 0 && !l.problem.fixed(j) ? j : -1;
+  };
+  auto const block = [&](int i, int j) {
+    return matrix.matrix().block(i, nodes.ijk(j, 0) - nodes.ijk(i, 0),
+                                 nodes.ijk(j, 1) - nodes.ijk(i, 1),
+                                 nodes.ijk(j, 2) - nodes.ijk(i, 2));
+  };
+  std::vector<int> cut, held(l.n, 0);
+  for (int i = 0; i < l.n; ++i) {
+    if (l.problem.fixed(i)) continue;
+    double most = 0;
+    for (int k = 0; k < 27; ++k) {
+      if (int const j = around(i, k); j >= 0) {
+        most = std::max(most, contract(block(j, j), identity3<double>()));
+      }
+    }
+    if (!(contract(block(i, i), identity3<double>()) < params.ratio * most)) continue;
+    cut.push_back(i);
+    for (int k = 0; k < 27; ++k)
+      if (int const j = around(i, k); j >= 0) ++held[j];
+  }
+  REQUIRE(cut.size() > 3);
+  CHECK(level.patches() == int(cut.size()));
+  for (int i = 0; i < l.n; ++i) {
+    if (held[i] > 0) continue;
+    auto const z = kernels::block_times<double>(
+        level.inverse(), i, {double(r(i, 0)), double(r(i, 1)), double(r(i, 2))});
+    for (int c = 0; c < 3; ++c) expected(i, c) = z[c];
+  }
+  for (int const i : cut) {
+    std::vector<double> a(81 * 81, 0.0);
+    for (int v = 0; v < 81; ++v) a[82 * v] = 1;
+    for (int v = 0; v < 27; ++v)
+      for (int w = 0; w < 27; ++w) {
+        int const from = around(i, v), to = around(i, w);
+        if (from < 0 || to < 0) continue;
+        bool near = true;
+        for (int c = 0; c < 3; ++c)
+          near = near && std::abs(nodes.ijk(from, c) - nodes.ijk(to, c)) <= 2;
+        REQUIRE(near);
+        Mat3<double> const b = block(from, to);
+        for (int c = 0; c < 9; ++c) a[81 * (3 * v + c % 3) + 3 * w + c / 3] = b.a[c];
+      }
+    REQUIRE(invert_positive(a, 81, 1e-16) == 0);
+    for (int v = 0; v < 81; ++v) {
+      int const to = around(i, v / 3);
+      if (to < 0) continue;
+      for (int w = 0; w < 81; ++w) {
+        int const from = around(i, w / 3);
+        if (from < 0) continue;
+        expected(to, v % 3) +=
+            a[81 * v + w] * r(from, w % 3) / std::sqrt(double(held[to]) * held[from]);
+      }
+    }
+  }
+  CHECK(apart(level.preconditioned(r), expected, l.n) < 1e-9);
+}
+
 TEST_CASE("matrices of particles do not depend on the number of threads", "[mpm][operator]") {
   using C = Of<Fp64, test::Right<DefaultSpace>, true>;
   auto const numbers = [] {
