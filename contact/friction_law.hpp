@@ -23,7 +23,7 @@ namespace taut {
 
 /// A contact that slips by r = u / e.
 template <class T>
-struct Slip {
+struct SlipState {
   Vec3<T> r;
   T y;            ///< |r|
   T slope_ratio;  ///< f'(y) / y
@@ -37,7 +37,7 @@ struct Slip {
 };
 
 template <class T>
-KOKKOS_INLINE_FUNCTION Slip<T> evaluate_slip(Vec3<T> const& r) {
+KOKKOS_INLINE_FUNCTION SlipState<T> evaluate_slip(Vec3<T> const& r) {
   T const y = norm(r);
   bool const sticks = y < T(1);
   return {r, y, sticks ? T(2) - y : T(1) / y, sticks ? T(2) * (T(1) - y) : T(0)};
@@ -67,7 +67,7 @@ KOKKOS_INLINE_FUNCTION T friction_energy_change(Vec3<T> const& before, Vec3<T> c
 
 /// p' H p of e / L times the Hessian, for p normal to n.
 template <class T>
-KOKKOS_INLINE_FUNCTION T friction_form(Slip<T> const& s, Vec3<T> const& p) {
+KOKKOS_INLINE_FUNCTION T friction_form(SlipState<T> const& s, Vec3<T> const& p) {
   Vec3<T> const w = s.direction();
   T const along = dot(w, p);
   Vec3<T> const across = p - along * w;
@@ -76,7 +76,7 @@ KOKKOS_INLINE_FUNCTION T friction_form(Slip<T> const& s, Vec3<T> const& p) {
 
 /// e / L times the Hessian, for contacts of unit normal n.
 template <class T>
-KOKKOS_INLINE_FUNCTION Sym3<T> friction_hessian(Slip<T> const& s, Vec3<T> const& n) {
+KOKKOS_INLINE_FUNCTION Sym3<T> friction_hessian(SlipState<T> const& s, Vec3<T> const& n) {
   Vec3<T> const w = s.direction();
   T const h = s.slope_ratio, along = s.curvature - h;
   return {{h * (T(1) - square(n[0])) + along * square(w[0]),

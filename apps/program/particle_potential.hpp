@@ -77,8 +77,6 @@ private:
 using ParticlePotential = Potential<Inertia<ParticlePrecision>, BodyForce<ParticlePrecision>,
                                     ParticleTerms, Slip<ParticlePrecision>>;
 
-/// The models that are compiled for particles; the first is the default.
-std::span<std::string_view const> particle_models();
 /// What ParticleBlocks are to be padded to for them.
 int particle_lanes();
 /// Adds the elastic term of a model. Throws Error for one that is not compiled.

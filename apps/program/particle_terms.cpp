@@ -1,5 +1,6 @@
 // The elastic models that the program knows for material points.
 #include <taut/apps/program/particle_potential.hpp>
+#include <taut/apps/program/scene.hpp>
 #include <taut/materials/fixed_corotated.hpp>
 #include <taut/mpm/elastic_particles.hpp>
 

@@ -21,7 +21,7 @@ namespace {
 using Wide = long double;
 
 double slope(double y) {
-  Slip<double> const s = evaluate_slip(Vec3<double>{y, 0, 0});
+  SlipState<double> const s = evaluate_slip(Vec3<double>{y, 0, 0});
   return s.slope_ratio * s.y;
 }
 
