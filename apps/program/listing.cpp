@@ -191,6 +191,10 @@ int plan_particles(Scene const& scene) {
 int methods_command() {
   fmt::print("solver.method: what minimises the energy of a step\n");
   for (MethodTitle const& m : method_titles()) fmt::print("  {:<11} {}\n", m.name, m.description);
+  fmt::print("solver.method, of material points: nonlinear CG and newton as above, and\n");
+  for (MethodTitle const& m : particle_method_titles()) {
+    fmt::print("  {:<13} {}\n", m.name, m.description);
+  }
   for (OptionKey const& key : solver_keys()) {
     if (key.name != "method") print_key("solver", key);
   }

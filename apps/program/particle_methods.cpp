@@ -113,8 +113,8 @@ class Builder {
 public:
   using Made = std::unique_ptr<ParticleMinimiser::Interface>;
 
-  explicit Builder(ParticleMethod const& method)
-      : options_(method.options), method_(options_.text("method")) {}
+  explicit Builder(SolverOptions const& options)
+      : options_(options), method_(options.text("method")) {}
 
   Made make() const {
     if (method_ == "newton" || method_.starts_with("pn_")) return newton();
@@ -258,6 +258,6 @@ std::span<MethodTitle const> particle_method_titles() {
   return titles;
 }
 
-ParticleMinimiser::ParticleMinimiser(Params const& method) : minimiser_(Builder(method).make()) {}
+ParticleMinimiser::ParticleMinimiser(Params const& options) : minimiser_(Builder(options).make()) {}
 
 }  // namespace taut

@@ -12,22 +12,16 @@
 
 namespace taut {
 
-/// Parts of a method that the word auto of [solver] leaves open.
-struct ParticleMethod {
-  SolverOptions options;
-  GridNodes<DefaultSpace> const* nodes = nullptr;  ///< of the grid that outlives the minimiser
-};
-
 /// A minimiser of the potential of particles that was chosen by name.
 class ParticleMinimiser {
 public:
   using Precision = ParticlePrecision;
   using Space = DefaultSpace;
   using Positions = VectorField<Precision::position, Space>;
-  using Params = ParticleMethod;
+  using Params = SolverOptions;
 
   /// Throws Error for a combination of options that does not exist.
-  explicit ParticleMinimiser(Params const& method);
+  explicit ParticleMinimiser(Params const& options);
 
   NewtonReport minimise(ParticlePotential& potential, Positions const& x,
                         Observer<Precision, Space> const& observer) {

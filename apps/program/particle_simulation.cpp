@@ -43,7 +43,7 @@ public:
         grid_(points_.spacing, particle_lanes()),
         potential_(make_potential(start)),
         boundaries_(boundary_specs(points_)),
-        stepper_(ImplicitEuler<ParticleMinimiser>({scene.solver, &grid_.nodes()}, lagging()),
+        stepper_(ImplicitEuler<ParticleMinimiser>(scene.solver, lagging()),
                  {points_.cfl, points_.crossing, points_.halvings}, transfer_of(points_),
                  Flows(start.flows)) {}
 
