@@ -42,6 +42,12 @@ public:
     }
     using Minimiser = Ncg<AnyBeta, AnyPreconditioner, AnyLineSearch, AnyStopping, P, Space>;
     typename Minimiser::Params params;
+    if (method.starts_with("hot") || method.starts_with("pn_") || method == "lbfgs_h") {
+      throw Error(
+          "solver.method = \"{}\" is of scenes of material points: choose lbfgs, newton, chebyshev "
+          "or a nonlinear CG",
+          method);
+    }
     params.beta = AnyBeta(method);
     return hold<Minimiser>(params);
   }

@@ -4,6 +4,7 @@
 #include <taut/apps/program/any_policies.hpp>
 #include <taut/apps/program/scene_options.hpp>
 #include <taut/core/potential/preconditioning.hpp>
+#include <taut/core/report/error.hpp>
 
 namespace taut {
 
@@ -20,6 +21,11 @@ inline AnyStopping::Params stopping_of(SolverOptions const& options, int window)
   double const tolerance = options.number("tolerance");
   if (name == "energy_drop") return EnergyDrop::Params{.tolerance = tolerance};
   if (name == "gradient_norm") return GradientNorm::Params{tolerance, true};
+  if (name == "characteristic_norm") {
+    throw Error(
+        "solver.stopping = \"characteristic_norm\" is of scenes of material points: choose "
+        "decrement_window, energy_drop or gradient_norm");
+  }
   int const asked = options.integer("window");
   return DecrementWindow::Params{.tolerance = name == "budget" ? 0 : tolerance,
                                  .window = asked > 0 ? asked : window};

@@ -193,7 +193,13 @@ TEST_CASE("all methods find the same step", "[particles]") {
        {"solver.method=dk"},
        {"solver.method=newton", "solver.hessian=matrix_free", "solver.preconditioner=jacobi"},
        {"solver.method=lbfgs", "solver.preconditioner=block_jacobi"},
-       {"solver.method=bfgs", "solver.preconditioner=identity"}}));
+       {"solver.method=bfgs", "solver.preconditioner=identity"},
+       {"solver.method=hot"},
+       {"solver.method=hot_quadratic"},
+       {"solver.method=lbfgs_h"},
+       {"solver.method=pn_pcg"},
+       {"solver.method=pn_pcg_mf"},
+       {"solver.method=pn_mgpcg"}}));
   CAPTURE(other);
   auto const x = step(other);
   double worst = 0;
@@ -233,4 +239,10 @@ TEST_CASE("mistakes in a scene of material points are answered by a sentence", "
   SceneRun const metric("plain.toml", plain_scene, {"solver.preconditioner=multigrid"});
   CHECK_THROWS_MATCHES(run_command(metric.options), Error,
                        MessageMatches(ContainsSubstring("needs the nodes of a grid")));
+  SceneRun const method("plain.toml", plain_scene, {"solver.method=hot"});
+  CHECK_THROWS_MATCHES(run_command(method.options), Error,
+                       MessageMatches(ContainsSubstring("is of scenes of material points")));
+  SceneRun const rule("plain.toml", plain_scene, {"solver.stopping=characteristic_norm"});
+  CHECK_THROWS_MATCHES(run_command(rule.options), Error,
+                       MessageMatches(ContainsSubstring("is of scenes of material points")));
 }
