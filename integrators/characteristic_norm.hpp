@@ -74,8 +74,11 @@ public:
     add(progress);
     return Stop::none;
   }
-  template <CharacteristicObjective E>
+  template <class E>
   Stop judge(E& e, VectorField<typename E::Precision::real, S> const& g) {
+    static_assert(CharacteristicObjective<E>,
+                  "taut: CharacteristicNorm wants a potential of which a term knows its "
+                  "characteristic force (core/potential/term.hpp)");
     int const n = e.size();
     if (!begun_) {
       force_ = memory_.resize("characteristic_force", n);

@@ -11,8 +11,7 @@
 namespace taut {
 
 /// `Hessian` as in Pcg, with a product that needs no objective.
-template <class P = Mixed, class S = DefaultSpace,
-          template <class, class> class Hessian = AssembledHessian>
+template <class P = Mixed, class S = DefaultSpace, class Hessian = AssembledHessian<P, S>>
 class InverseByPcg {
 public:
   using Vectors = VectorField<typename P::real, S>;
@@ -54,7 +53,7 @@ public:
 private:
   Params params_;
   BlockJacobi<P, S> jacobi_;
-  Hessian<P, S> hessian_;
+  Hessian hessian_;
   ConjugateGradients<P, S> cg_;
   mutable int iterations_ = 0;
 };

@@ -28,7 +28,7 @@ template <class Precision, class Space>
 using MatrixOfParticles = ParticleHessian<Precision, Space, true>;
 template <class Precision, class Space>
 using NumbersOfParticles = ParticleHessian<Precision, Space, false>;
-using HessianByPcg = InverseByPcg<P, S, MatrixOfParticles>;
+using HessianByPcg = InverseByPcg<P, S, MatrixOfParticles<P, S>>;
 
 /// Chosen at run time, so that each minimiser is compiled once.
 template <class Precision, class Space>
