@@ -173,7 +173,8 @@ std::vector<SceneBody> read_body(Section const& s, Scene const& scene, double pe
 }
 
 SceneBoundary read_boundary(Section const& s) {
-  s.allow({"name", "shape", "scale", "rotate", "translate", "motion", "contact", "friction", "release"});
+  s.allow({"name", "shape", "scale", "rotate", "translate", "motion", "contact", "friction",
+           "release"});
   SceneBoundary boundary;
   boundary.where = s.where();
   boundary.name = s.text("name");

@@ -175,8 +175,10 @@ private:
   /// tiny.
   ParticleStepReport<NewtonReport> step_of_grid(double end, Observer<P, S> const& observer) {
     double const left = end - time_;
+    double const longest = points_.longest_step.value_or(left);
+    // What round-off has added to the frame is no step of its own.
     double h = stepper_.cfl_step(particles_, points_.spacing,
-                                 std::min(left, points_.longest_step.value_or(left)));
+                                 left <= longest * (1 + 1e-9) ? left : longest);
     if (h < left && 2 * h > left) h = left / 2;
     try {
       return stepper_.step(potential_, grid_, particles_, h, boundaries_, time_, observer);

@@ -182,8 +182,8 @@ struct SceneBoundary {
   bool inside = false;                        ///< the bodies are inside of it
   BoundaryLaw law = BoundaryLaw::stick;
   double friction = 0;
-  RigidMap placement;  ///< at time 0
-  RigidMotion motion;  ///< from there
+  RigidMap placement;             ///< at time 0
+  RigidMotion motion;             ///< from there
   std::optional<double> release;  ///< s, when it is taken away; not of half spaces and containers
 };
 

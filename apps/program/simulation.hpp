@@ -27,9 +27,9 @@ class Simulation {
 public:
   virtual ~Simulation() = default;
 
-  /// Discretises a scene of meshes (of material points: ParticleSimulation). Throws Error if it asks for what does not exist, starts with an
-  /// inverted element of a material that forbids it, or has a body smaller than the distance of
-  /// contact.
+  /// Discretises a scene of meshes (of material points: ParticleSimulation). Throws Error if it
+  /// asks for what does not exist, starts with an inverted element of a material that forbids it,
+  /// or has a body smaller than the distance of contact.
   static std::unique_ptr<Simulation> create(Scene const& scene, SceneGeometry const& geometry);
 
   /// One time step. Throws Error if the energy stops being a number, naming the elements, or if

@@ -103,17 +103,21 @@ void refused(std::string const& old, std::string const& by, std::string const& s
 TEST_CASE("small scenes of material points run clean", "[particles][scenes]") {
   double const torus = 2 * pi * pi * 0.2 * 0.04 * 0.04;
   Trial const trial =
-      GENERATE_COPY(values<Trial>({{"twist", 2, -1},
+      GENERATE_COPY(values<Trial>({{"twist", 1, -1},
                                    {"boxes", 1, -1},
-                                   {"chain", 2, 7 * 2000 * torus},
-                                   {"bar_sweep", 2, 2000 * 0.12 * 0.12 * 0.9},
+                                   {"chain", 1, 7 * 2000 * torus},
+                                   {"bar_sweep", 1, 2000 * 0.12 * 0.12 * 0.9},
                                    {"stretched_box", 2, 1000 * 0.125},
-                                   {"sand_column", 4, 1600 * pi * 0.01 * 0.1},
-                                   {"taylor_bar", 6, 8930 * pi * 0.0032 * 0.0032 * 0.0324},
-                                   {"snowball", 6, 400 * 4 * pi * 1e-3 / 3},
+                                   {"sand_column", 1, 1600 * pi * 0.01 * 0.1},
+                                   {"taylor_bar", 1, 8930 * pi * 0.0032 * 0.0032 * 0.0324},
+                                   {"snowball", 3, 400 * 4 * pi * 1e-3 / 3},
                                    {"donut", 1, -1}}));
   CAPTURE(trial.scene);
-  BuiltIn const run(trial.scene, {fmt::format("time.frames={}", trial.frames)});
+  BuiltIn run(trial.scene, {fmt::format("time.frames={}", trial.frames)});
+  // A frame of these is ten steps of the grid: one will do.
+  double const longest = run.scene().particles->longest_step.value_or(1);
+  if (trial.frames == 1 && longest < run.scene().step)
+    run.options.scene.changes.overrides.push_back(fmt::format("time.step={}", longest));
   CHECK(run_command(run.options) == 0);
   auto const summary = run.summary();
   CHECK(summary.at("ended") == "finished");
@@ -131,12 +135,17 @@ TEST_CASE("two disks meet, bounce and keep their momentum", "[particles][truth]"
   REQUIRE(run_command(run.options) == 0);
   ResultReader const result = run.result();
   std::size_t const n = result.mesh().particles;
+  /// Per mass of a disk.
   auto const momentum = [&](std::int64_t frame, int object) {
     Point sum{};
+    double count = 0;
     auto const v = result.velocities(frame);
-    for (std::size_t p = 0; p < n; ++p)
-      if (result.mesh().object[p] == object) sum = sum + (1.0 / double(n)) * v[p];
-    return sum;
+    for (std::size_t p = 0; p < n; ++p) {
+      if (result.mesh().object[p] != object) continue;
+      sum = sum + v[p];
+      ++count;
+    }
+    return (1 / count) * sum;  // both disks have one mass, their particles do not
   };
   auto const energy = [&](std::int64_t frame) {
     double sum = 0;
@@ -159,10 +168,10 @@ TEST_CASE("two disks meet, bounce and keep their momentum", "[particles][truth]"
 }
 
 TEST_CASE("a run of material points goes on bitwise", "[particles]") {
-  BuiltIn whole("snowball", {"time.frames=6"}), first("snowball", {"time.frames=3"});
+  BuiltIn whole("snowball", {"time.frames=4"}), first("snowball", {"time.frames=2"});
   REQUIRE(run_command(whole.options) == 0);
   REQUIRE(run_command(first.options) == 0);
-  first.options.scene.changes.overrides = {"time.frames=6"};
+  first.options.scene.changes.overrides = {"time.frames=4"};
   first.options.restart = true;
   REQUIRE(run_command(first.options) == 0);
   ResultReader const a = whole.result(), b = first.result();
