@@ -14,6 +14,7 @@
 #include <taut/contact/candidate_cache.hpp>
 #include <taut/contact/contact_islands.hpp>
 #include <taut/contact/contact_pairs.hpp>
+#include <taut/contact/contact_report.hpp>
 #include <taut/contact/lag_pairs.hpp>
 #include <taut/contact/step_bound_sweep.hpp>
 #include <taut/core/potential/term.hpp>
@@ -25,13 +26,6 @@
 #include <vector>
 
 namespace taut {
-
-/// What contact amounts to at some positions.
-struct ContactReport {
-  int candidates = 0;       ///< pairs that were looked at
-  int contacts = 0;         ///< of these, pairs that act
-  double smallest_gap = 1;  ///< least distance over activation distance (dhat between bodies)
-};
 
 /// The pair that a step bound stopped at.
 struct LimitingPair {

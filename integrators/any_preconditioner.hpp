@@ -11,42 +11,26 @@
 
 namespace taut {
 
-template <class P = Mixed, class S = DefaultSpace>
-class AnyPreconditioner {
-  template <class... Ms>
-  struct Alternatives {
-    using Preconditioner = std::variant<Ms...>;
-    using Params = std::variant<typename Ms::Params...>;
-
-    static Params by_name(std::string_view name) {
-      Params params;
-      bool const found = ((Ms::name == name && (params = typename Ms::Params(), true)) || ...);
-      if (found) return params;
-      std::string known;
-      ((known += (known.empty() ? "" : ", ") + std::string(Ms::name)), ...);
-      throw Error("preconditioner \"{}\" does not exist; choose one of {}", name, known);
-    }
-    static Preconditioner make(Params const& params) {
-      Preconditioner made;
-      ((std::holds_alternative<typename Ms::Params>(params)
-            ? void(made = Ms(std::get<typename Ms::Params>(params)))
-            : void()),
-       ...);
-      return made;
-    }
-  };
-  using All = Alternatives<BlockJacobi<P, S>, Jacobi<P, S>, Identity<P, S>, Schwarz<P, S>>;
-
+/// One of `Ms`.
+template <class P, class S, class... Ms>
+class OneOfPreconditioners {
 public:
   using Vectors = VectorField<typename P::real, S>;
-  /// The Params of the one that is meant; of block Jacobi by default.
-  using Params = typename All::Params;
+  /// The Params of the one that is meant; of the first by default.
+  using Params = std::variant<typename Ms::Params...>;
 
   /// Default Params of the preconditioner of that name. Throws `Error` if there is none.
-  static Params by_name(std::string_view name) { return All::by_name(name); }
+  static Params by_name(std::string_view name) {
+    Params params;
+    bool const found = ((Ms::name == name && (params = typename Ms::Params(), true)) || ...);
+    if (found) return params;
+    std::string known;
+    ((known += (known.empty() ? "" : ", ") + std::string(Ms::name)), ...);
+    throw Error("preconditioner \"{}\" does not exist; choose one of {}", name, known);
+  }
 
-  AnyPreconditioner() : AnyPreconditioner(Params()) {}
-  explicit AnyPreconditioner(Params const& params) : chosen_(All::make(params)) {}
+  OneOfPreconditioners() : OneOfPreconditioners(Params()) {}
+  explicit OneOfPreconditioners(Params const& params) : chosen_(make(params)) {}
 
   Refresh refresh() const {
     return std::visit([](auto const& m) { return m.refresh(); }, chosen_);
@@ -70,7 +54,26 @@ public:
   }
 
 private:
-  typename All::Preconditioner chosen_;
+  using Chosen = std::variant<Ms...>;
+
+  static Chosen make(Params const& params) {
+    Chosen made;
+    ((std::holds_alternative<typename Ms::Params>(params)
+          ? void(made = Ms(std::get<typename Ms::Params>(params)))
+          : void()),
+     ...);
+    return made;
+  }
+
+  Chosen chosen_;
+};
+
+/// Those that need to know nothing but the unknowns; block Jacobi by default.
+template <class P = Mixed, class S = DefaultSpace>
+class AnyPreconditioner : public OneOfPreconditioners<P, S, BlockJacobi<P, S>, Jacobi<P, S>,
+                                                      Identity<P, S>, Schwarz<P, S>> {
+public:
+  using AnyPreconditioner::OneOfPreconditioners::OneOfPreconditioners;
 };
 
 }  // namespace taut

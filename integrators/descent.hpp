@@ -164,7 +164,9 @@ private:
   static constexpr double epsilon = double(Kokkos::Experimental::epsilon_v<T>);
 
   void iterate() {
-    bool const renewed = measure();
+    measure();
+    if (ends_here()) return;
+    bool const renewed = renew();
     Heading const heading = aim(renewed);
     report_.gradient_norm = std::sqrt(heading.gradient / scale_.mass);
     if (!std::isfinite(heading.slope)) {
@@ -180,8 +182,8 @@ private:
     }
   }
 
-  /// Gradient and preconditioner at x, as far as they are not known; true if the latter is new.
-  bool measure() {
+  /// The gradient at x, as far as it is not known, and the curvature that is due.
+  void measure() {
     LocalMatrices<P, S> const& curvature = preconditioner_.curvature();
     if (!step_.evaluated || (clock_.due() && !fresh_curvature_ && !curvature.empty())) {
       if (clock_.due() && curvature.blocks.extent(0) > 0) {
@@ -192,6 +194,24 @@ private:
         e_.gradient(x_, fields_.gradient);
       }
     }
+  }
+  /// Whether a rule that judges by the gradient has seen enough.
+  bool ends_here() {
+    if constexpr (GradientRule<Rule, E>) {
+      Stop const stop = rule_.judge(e_, fields_.gradient);
+      if (stop == Stop::none) return false;
+      if (advance_prescribed()) {
+        ++report_.iterations;
+      } else {
+        report_.stop = stop;
+      }
+      return true;
+    } else {
+      return false;
+    }
+  }
+  /// True if the preconditioner was due, and is that of x now.
+  bool renew() {
     if (!clock_.due()) return false;
     preconditioner_.update(e_, x_);
     clock_.updated();

@@ -27,7 +27,7 @@ public:
   /// Exact whatever the tolerance. Fails (p is then not written) where H is not positive definite.
   template <class E, class M>
   LinearReport solve(E& e, VectorField<typename P::position, S> const& x, Vectors const& b,
-                     M const&, double, Vectors const& p) {
+                     M const&, LinearTolerance const&, Vectors const& p) {
     if (solver_.factorize(matrix_.at(e, x)) != Definiteness::positive) return {};
     int const n = static_cast<int>(b.extent(0));
     Kokkos::deep_copy(host_, b);

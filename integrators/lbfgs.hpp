@@ -128,6 +128,8 @@ struct LbfgsParams {
   /// Try the step of the quadratic model first; off: the unit step, which needs no p'Hp but suits
   /// only a P that is close to H^-1 in size, too.
   bool newton_step = true;
+  /// Without pairs, too, the first step tried is that of the quadratic model; off: the unit step.
+  bool newton_first_step = true;
   double least_curvature = 1e-8;  ///< pairs are kept if s'y exceeds this times |s'g|
 };
 
@@ -212,7 +214,8 @@ public:
     heading.descent = std::abs(heading.slope);  // positive definite: any descent will do
     heading.metric = double(sums[1]);
     heading.steepest = pairs_ == 0;
-    heading.first_length = heading.steepest || params_.newton_step ? 0 : 1;
+    bool const by_model = heading.steepest ? params_.newton_first_step : params_.newton_step;
+    heading.first_length = by_model ? 0 : 1;
     return heading;
   }
 

@@ -25,12 +25,28 @@ struct LinearReport {
   double residual = 1;  ///< |r| / |b| in the norm r'P r; known only to iterative solvers
 };
 
+/// How exact a solution is to be: a relative residual, in the norm |r| = sqrt(r'P r) of the
+/// preconditioner; or where `scale` is not 0, min(relative, sqrt(max(scale |b|, least))), which is
+/// known once the solver has taken that norm of b.
+struct LinearTolerance {
+  double relative;
+  double scale = 0, least = 0;
+
+  LinearTolerance(double relative_) : relative(relative_) {}
+  LinearTolerance(double relative_, double scale_, double least_)
+      : relative(relative_), scale(scale_), least(least_) {}
+  double of(double norm_of_b) const {
+    if (scale == 0) return relative;
+    return std::min(relative, std::sqrt(std::max(scale * norm_of_b, least)));
+  }
+};
+
 /// `L` solves with the Hessian of the Objective `E`, helped by the Preconditioner `M`.
 template <class L, class E, class M>
 concept LinearSolver = requires(
     L& solver, E& e, VectorField<typename E::Precision::position, typename E::Space> const& x,
     VectorField<typename E::Precision::real, typename E::Space> const& b, M const& preconditioner,
-    double tolerance) {
+    LinearTolerance const& tolerance) {
   typename L::Params;
   {L(typename L::Params())};
   /// Memory for a minimisation of e.
@@ -115,7 +131,7 @@ public:
   /// `product(d, hd)` makes hd = H d; `preconditioner.apply(r, z)` makes z = P r.
   template <class Product, class M>
   LinearReport solve(Product const& product, M const& preconditioner, Vectors const& b,
-                     double tolerance, int max_iterations, Vectors const& p) {
+                     LinearTolerance const& tolerance, int max_iterations, Vectors const& p) const {
     typename S::execution const& execution = S::instance();
     int const n = static_cast<int>(b.extent(0));
     Kokkos::deep_copy(execution, p, Real(0));
@@ -126,12 +142,13 @@ public:
     LinearReport report{.stop = LinearStop::converged, .residual = 0};
     if (first == 0) return report;
 
+    double const asked = tolerance.of(std::sqrt(first));
     double r_P_r = first;
     double d_Pinv_d = first;  // the length of d in the metric in which the curvatures are near 1
     double stiffest = 0;
     for (;; ++report.iterations) {
       report.residual = std::sqrt(r_P_r / first);
-      if (report.residual <= tolerance) return report;
+      if (report.residual <= asked) return report;
       if (report.iterations == max_iterations) {
         report.stop = LinearStop::budget;
         return report;
@@ -204,11 +221,15 @@ public:
   void update(E& e, VectorField<typename P::position, S> const& x) {
     matrix_.at(e, x);
   }
+  void product(VectorField<typename P::real, S> const& d,
+               VectorField<typename P::real, S> const& hd) const {
+    taut::product(matrix_(), d, hd);
+  }
   template <class E>
   void product(E&, VectorField<typename P::position, S> const&,
                VectorField<typename P::real, S> const& d,
                VectorField<typename P::real, S> const& hd) const {
-    taut::product(matrix_(), d, hd);
+    product(d, hd);
   }
 
 private:
@@ -250,7 +271,7 @@ public:
   }
   template <class E, class M>
   LinearReport solve(E& e, VectorField<typename P::position, S> const& x, Vectors const& b,
-                     M const& preconditioner, double tolerance, Vectors const& p) {
+                     M const& preconditioner, LinearTolerance const& tolerance, Vectors const& p) {
     hessian_.update(e, x);
     auto const product = [&](Vectors const& d, Vectors const& hd) {
       hessian_.product(e, x, d, hd);

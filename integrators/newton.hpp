@@ -4,6 +4,7 @@
 // ends at round-off, which makes it the reference that other methods are measured against.
 #pragma once
 
+#include <taut/integrators/characteristic_norm.hpp>
 #include <taut/integrators/descent.hpp>
 #include <taut/integrators/linear_solver.hpp>
 
@@ -28,8 +29,11 @@ public:
   };
   explicit ForcingTerm(Params const& params) : params_(params) {}
 
+  template <class E>
+  void start(E&) {}
   void restart() { norm_before_ = 0; }
-  double operator()(double norm) {
+  /// From |M^-1 g|, mass-weighted, before the step.
+  LinearTolerance operator()(double norm) {
     double eta = params_.largest;
     if (norm_before_ > 0 && !params_.fixed) {
       eta = params_.gamma * std::pow(norm / norm_before_, params_.exponent);
@@ -45,6 +49,33 @@ public:
 private:
   Params params_;
   double norm_before_ = 0, eta_before_ = 0;
+};
+
+/// HOT's rule (Wang et al. 2020, section 6; after Gast et al. 2015): to a relative residual of
+///   min(largest, sqrt(max(|r|, tau))),
+/// with r the residual of momentum, g / h, and tau what is small for all unknowns together, the
+/// tolerance times sqrt(n) times the largest characteristic force (of an unknown) over a step.
+class RootForcing {
+public:
+  struct Params {
+    double largest = 0.5;
+    double tolerance = 1e-7;  ///< that of CharacteristicNorm
+  };
+  explicit RootForcing(Params const& params) : params_(params) {}
+
+  template <class E>
+  void start(E& e) {
+    double const h = e.scale().time_step;
+    double const most = largest_characteristic_force(e);
+    tolerance_ = {params_.largest, 1 / h,
+                  params_.tolerance * std::sqrt(double(e.size())) * h * most};
+  }
+  void restart() {}
+  LinearTolerance operator()(double) const { return tolerance_; }
+
+private:
+  Params params_;
+  LinearTolerance tolerance_ = 0.5;
 };
 
 namespace kernels {
@@ -125,10 +156,10 @@ inline NewtonReport in_sequence(NewtonReport const& first, NewtonReport const& s
 }
 
 /// The directions of Newton's method.
-template <class Linear, class P, class S>
+template <class Linear, class P, class S, class Forcing = ForcingTerm>
 class NewtonDirections {
 public:
-  NewtonDirections(typename Linear::Params const& linear, ForcingTerm::Params const& forcing)
+  NewtonDirections(typename Linear::Params const& linear, typename Forcing::Params const& forcing)
       : linear_(linear), forcing_(forcing) {}
 
   void resize(int n) {
@@ -147,7 +178,10 @@ public:
   template <class E, class M>
   Heading next(E& e, VectorField<typename P::position, S> const& x, DescentFields<P, S>& fields,
                M const& preconditioner, Step const&, bool) {
-    if (!started_) linear_.start(e);
+    if (!started_) {
+      linear_.start(e);
+      forcing_.start(e);
+    }
     started_ = true;
     // There is no past in a Newton direction, so nothing else could be tried where it fails.
     Heading heading{.first_length = 1, .steepest = true, .solved = true};
@@ -156,7 +190,7 @@ public:
     heading.gradient = reducer_.template sum<1>("newton_rhs", e.size(),
                                                 RightHandSide{fields.gradient, b_, fields.mass})[0];
 
-    double const tolerance = forcing_(std::sqrt(heading.gradient));
+    LinearTolerance const tolerance = forcing_(std::sqrt(heading.gradient));
     LinearReport const linear = linear_.solve(e, x, b_, preconditioner, tolerance, p);
     linear_iterations_ += linear.iterations;
     auto sums = products(fields);
@@ -169,7 +203,7 @@ public:
     heading.slope = sums[Products::slope];
     heading.metric = sums[Products::metric];
     heading.descent = std::abs(heading.slope);
-    heading.shortened = !heading.solved || linear.residual > std::max(tolerance, unsolved);
+    heading.shortened = !heading.solved || linear.residual > std::max(tolerance.relative, unsolved);
     return heading;
   }
 
@@ -187,7 +221,7 @@ private:
   }
 
   Linear linear_;
-  ForcingTerm forcing_;
+  Forcing forcing_;
   VectorField<typename P::real, S> b_;  ///< -g
   Resizable<VectorField<typename P::real, S>> b_memory_;
   Reducer<S> reducer_;
@@ -202,7 +236,7 @@ inline constexpr int newton_backtracks = 30;
 template <template <class...> class LinearSolver_ = AssembledPcg,
           template <class...> class Preconditioner_ = BlockJacobi,
           class LineSearch_ = SufficientDecrease, Stopping Stopping_ = DecrementWindow,
-          class Precision_ = Mixed, class Space_ = DefaultSpace>
+          class Precision_ = Mixed, class Space_ = DefaultSpace, class Forcing = ForcingTerm>
 class Newton {
 public:
   using Precision = Precision_;
@@ -213,7 +247,7 @@ public:
 
   struct Params {
     typename Linear::Params linear = {};
-    ForcingTerm::Params forcing = {};
+    typename Forcing::Params forcing = {};
     typename Preconditioner::Params preconditioner = {};
     typename LineSearch_::Params line_search = many_backtracks();
     typename Stopping_::Params stop = one_step_window();
@@ -270,7 +304,7 @@ private:
   Params params_;
   DescentFields<Precision, Space> fields_;
   int preconditioned_ = -1;  ///< unknowns that there is memory for
-  NewtonDirections<Linear, Precision, Space> directions_;
+  NewtonDirections<Linear, Precision, Space, Forcing> directions_;
   Preconditioner preconditioner_;
   LineSearch_ line_search_;
   UntilRoundOff<Stopping_, typename Precision::real> stopping_;

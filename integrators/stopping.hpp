@@ -57,6 +57,13 @@ concept Stopping = requires(R& rule, R const& c, Scale const& scale, Progress co
   { c.negligible() } -> std::convertible_to<double>;
 };
 
+/// A rule that judges by the gradient besides, before a direction is made of it.
+template <class R, class E>
+concept GradientRule = Stopping<R> &&
+    requires(R& rule, E& e, VectorField<typename E::Precision::real, typename E::Space> const& g) {
+  { rule.judge(e, g) } -> std::same_as<Stop>;
+};
+
 /// The sum over the last steps, and the error that it predicts.
 class ErrorEstimate {
 public:
@@ -275,6 +282,19 @@ public:
     auto const ask = [&](auto& rule) {
       Stop const answer = rule.check(progress);  // asked even if another has answered: rules count
       if (stop == Stop::none) stop = answer;
+    };
+    std::apply([&](Rules&... rule) { (ask(rule), ...); }, rules_);
+    return stop;
+  }
+  /// Of the rules that judge by the gradient.
+  template <class E>
+  Stop judge(E& e, VectorField<typename E::Precision::real, typename E::Space> const& g) requires(
+      GradientRule<Rules, E> || ...) {
+    Stop stop = Stop::none;
+    auto const ask = [&](auto& rule) {
+      if constexpr (requires { rule.judge(e, g); }) {
+        if (stop == Stop::none) stop = rule.judge(e, g);
+      }
     };
     std::apply([&](Rules&... rule) { (ask(rule), ...); }, rules_);
     return stop;

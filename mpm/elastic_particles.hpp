@@ -8,8 +8,8 @@
 #include <taut/core/fem/element_material.hpp>
 #include <taut/core/potential/term.hpp>
 #include <taut/core/report/error.hpp>
-#include <taut/mpm/particle_matrix_kernels.hpp>
-#include <taut/mpm/particles.hpp>
+#include <taut/mpm/characteristic_force.hpp>
+#include <taut/mpm/particle_assembly.hpp>
 
 namespace taut {
 
@@ -38,19 +38,6 @@ struct PreparePoints {
     to[12 * lanes] =
         p >= 0 ? static_cast<Real>(double(particles.volume(p)) * double(particles.stiffness(p)))
                : Real(0);
-  }
-};
-
-template <Spline K, class S>
-struct ColourOfBlock {
-  BlockViews<K, S> blocks;
-  Kokkos::View<int*, typename S::memory> colour;
-  KOKKOS_FUNCTION void operator()(int block) const {
-    int parity = 0;
-    for (int c = 0; c < 3; ++c) {
-      parity = 2 * parity + (blocks.origin(block, c) / BlockViews<K, S>::cells & 1);
-    }
-    colour(block) = parity;
   }
 };
 
@@ -104,6 +91,13 @@ public:
       : materials_(to_space(materials)), team_size_(packed_ ? 1 : team_size) {
     if (materials.empty()) throw Error("ElasticParticles: no materials; give one or more");
     if (team_size_ == 0) team_size_ = Space::on_host ? 1 : 64;
+    List<double> const norms("material_norm", materials.size());
+    auto const host = Kokkos::create_mirror_view(norms);
+    for (std::size_t k = 0; k < materials.size(); ++k) {
+      host(k) = norm_at_rest<Material>(materials[k]);
+    }
+    Kokkos::deep_copy(norms, host);
+    norms_ = norms;
   }
 
   int material_count() const { return static_cast<int>(materials_.extent(0)); }
@@ -116,6 +110,7 @@ public:
     grid_ = grid;
     cells_ = blocks.cells();
     cell_count_ = blocks.cell_count();
+    particles_ = particles;
     rest_ = rest;
     dx_ = grid.dx;
     ++version_;
@@ -182,9 +177,30 @@ public:
     run("particle_product", Kernel_{frame(x), p, static_cast<Real>(scale), partial_});
     gather<3>({{}, fixed, hp, {}, {}});
   }
+  /// The Hessian at x as the numbers of a ParticleOperator over Real.
+  template <class Operator>
+  void linearise(Positions const& x, double scale, Operator& to) const {
+    static_assert(std::same_as<typename Operator::T, Real>);
+    to.resize(blocks_, grid_, team_size_);
+    using Kernel_ = kernels::LineariseParticles<Space, Precision, Material, K, packed_>;
+    run("particle_linearise", Kernel_{frame(x), static_cast<Real>(scale), to.numbers()});
+  }
   /// Block by block and colour after colour; a block matrix of 125 (343) columns a row.
   void add_to(Matrix const& matrix, Positions const& x, double scale,
               FixedMask<Space> const& fixed) const;
+
+  /// See characteristic_force.hpp.
+  void add_characteristic_force(Array<double, Space> const& force) const {
+    List<double> const partial("characteristic_sums",
+                               std::size_t(2) * BlockViews<K, Space>::nodes * blocks_.patches);
+    using Sums_ = kernels::CharacteristicSums<Space, Precision, K>;
+    for_each<Space>("characteristic_sums", blocks_.patches,
+                    Sums_{{blocks_, data_}, particles_, norms_, partial});
+    using Add = kernels::AddCharacteristicForce<Space>;
+    for_each<Space>(
+        "characteristic_force", grid_.count,
+        kernels::GatherRows<Space, double, K, 2, Add>{blocks_, partial, {force, 24 * dx_ * dx_}});
+  }
 
   static constexpr double margin = kernels::inversion_margin;
 
@@ -263,7 +279,9 @@ private:
   }
 
   List<MaterialParameters const> materials_;
+  List<double const> norms_;  ///< per material
   int team_size_;
+  Particles<Precision, Space> particles_;
   BlockViews<K, Space> blocks_;
   GridNodes<Space> grid_;
   typename ParticleBlocks<K, Space>::Cells cells_;
@@ -302,19 +320,19 @@ double ElasticParticles<Material, K, Precision, Space, packed>::sweep(Positions 
 template <ElementMaterial Material, Spline K, class Precision, class Space, bool packed>
 void ElasticParticles<Material, K, Precision, Space, packed>::add_to(
     Matrix const& matrix, Positions const& x, double scale, FixedMask<Space> const& fixed) const {
-  constexpr int colours = 8;
-  List<int> const colour("block_colour", blocks_.blocks), begin("colour_begin", colours + 1),
-      order("colour_order", blocks_.blocks);
-  for_each<Space>("block_colour", blocks_.blocks,
-                  kernels::ColourOfBlock<K, Space>{blocks_, colour});
-  BucketSort<Space>(blocks_.blocks).sort(blocks_.blocks, colour, colours, begin, order);
-  auto const first = Kokkos::create_mirror_view_and_copy(Kokkos::HostSpace(), begin);
-  for (int c = 0; c < colours; ++c) {
+  BlockColours<K, Space> const colours(blocks_);
+  for (int c = 0; c < colours.colours; ++c) {
     using Kernel_ = kernels::AssembleBlocks<Space, Precision, Material, K, Matrix>;
-    for_each<Space>(
-        "particle_assemble", first(c + 1) - first(c),
-        Kernel_{
-            {blocks_, data_}, materials_, order, first(c), {x, rest_}, fixed, matrix, dx_, scale});
+    for_each<Space>("particle_assemble", colours.size(c),
+                    Kernel_{{blocks_, data_},
+                            materials_,
+                            colours.order(),
+                            colours.begin(c),
+                            {x, rest_},
+                            fixed,
+                            matrix,
+                            dx_,
+                            scale});
   }
 }
 

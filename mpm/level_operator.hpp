@@ -178,7 +178,7 @@ public:
   }
   std::size_t memory() const { return inverse_.span() * sizeof(T); }
 
-private:
+protected:
   GridNodes<Space> nodes_;
   FixedNodes<Space> fixed_;
   Action const* action_ = nullptr;

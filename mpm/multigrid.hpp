@@ -12,6 +12,7 @@
 
 #include <taut/core/sparse/dense_inverse.hpp>
 #include <taut/mpm/grid_level.hpp>
+#include <taut/mpm/level_pcg.hpp>
 #include <taut/mpm/smoother.hpp>
 
 #include <deque>
@@ -69,6 +70,11 @@ public:
     int direct_nodes = 60;  ///< the coarsest level may have so many; there is no coarser one then
     int visits = 1;         ///< of a coarser level in a cycle: 1 is a V-cycle, 2 a W-cycle
     int coarse_sweeps = 8;  ///< of the coarsest level, where it is not inverted
+    /// Above 0, where the coarsest level is not inverted: it is solved by conjugate gradients until
+    /// the residual is this part of what the right-hand side of the cycle, restricted without
+    /// smoothing, amounts to (HOT: 1/2), which may be at once.
+    double coarse_tolerance = 0;
+    int coarse_iterations = 10000;  ///< of these, at most
     typename FineSmoother::Params fine = {};
     typename Smoother::Params smoother = {};
   };
@@ -81,6 +87,7 @@ public:
   void build(Fine const& fine) {
     fine_ = &fine;
     report_ = {};
+    coarse_count_ = 0;
     report_.nodes.push_back(fine.size());
     fine_vectors_.resize(fine.size());
     fine_smoother_.setup(fine, fine_vectors_);
@@ -93,6 +100,13 @@ public:
       dx *= 2;
     }
     if (used_ > 0) invert_coarsest();
+    if (solves_by_pcg()) {
+      coarse_reducer_.provide(levels_[used_ - 1].level.size(), 1);
+      for (std::size_t l = 0; l < used_; ++l) {
+        grow(levels_[l].unsmoothed, "level_vector",
+             static_cast<std::size_t>(levels_[l].level.size()));
+      }
+    }
     for (std::size_t l = 0; l < used_; ++l) report_.memory += levels_[l].level.memory();
     report_.memory += fine.memory();
   }
@@ -107,6 +121,8 @@ public:
   }
 
   MultigridReport const& report() const { return report_; }
+  /// Of conjugate gradients on the coarsest level, in all cycles since `build`.
+  int coarse_iterations() const { return coarse_count_; }
   Params const& params() const { return params_; }
   /// Level `l` below the fine one.
   MatrixLevel<S, T, radius> const& level(int l) const { return levels_[l].level; }
@@ -116,7 +132,8 @@ private:
     GridLevel<S> grid;
     MatrixLevel<S, T, radius> level;
     LevelVectors<T, S> vectors;
-    VectorField<T, S> before;  ///< what the visits before have found
+    VectorField<T, S> before;      ///< what the visits before have found
+    VectorField<T, S> unsmoothed;  ///< the right-hand side of the cycle, restricted as it is
     Smoother smoother;
   };
 
@@ -189,9 +206,27 @@ private:
         inverse_.factorize(std::move(numbers), n, 16 * double(std::numeric_limits<T>::epsilon()));
   }
 
+  bool solves_by_pcg() const {
+    return used_ > 0 && !report_.direct && params_.coarse_tolerance > 0;
+  }
+  /// What the residual of the coarsest level has to come down to.
+  double enough_on_coarsest() const {
+    restrict_to<Embedding>(fine_->nodes(), fine_->fixed(), fine_vectors_.b,
+                           levels_[0].level.nodes(), levels_[0].unsmoothed);
+    for (std::size_t l = 1; l < used_; ++l) {
+      restrict_to<Embedding>(levels_[l - 1].level.nodes(), FixedNodes<S>(),
+                             levels_[l - 1].unsmoothed, levels_[l].level.nodes(),
+                             levels_[l].unsmoothed);
+    }
+    double const asked = params_.coarse_tolerance * params_.coarse_tolerance;
+    Level const& last = levels_[used_ - 1];
+    return asked * jacobi_form(last.level, last.unsmoothed, coarse_reducer_);
+  }
+
   /// From fine_vectors_.b to fine_vectors_.x.
   void cycle() const {
     auto const& v = fine_vectors_;
+    if (solves_by_pcg()) enough_ = enough_on_coarsest();
     fine_smoother_.first(*fine_, v);
     if (used_ > 0) {
       Level const& below = levels_[0];
@@ -207,7 +242,7 @@ private:
   /// From b to x of level l, by as many cycles as asked for.
   void visit(std::size_t l) const {
     Level const& level = levels_[l];
-    bool const exact = l + 1 == used_ && report_.direct;
+    bool const exact = l + 1 == used_ && (report_.direct || solves_by_pcg());
     int const visits = exact ? 1 : l + 1 == used_ ? params_.coarse_sweeps : params_.visits;
     auto const& v = level.vectors;
     int const n = level.level.size();
@@ -234,6 +269,11 @@ private:
       inverse_.apply(v.b, v.x);
       return;
     }
+    if (l + 1 == used_ && solves_by_pcg()) {
+      coarse_count_ +=
+          solve_by_pcg(level.level, v, coarse_reducer_, enough_, params_.coarse_iterations);
+      return;
+    }
     level.smoother.first(level.level, v);
     if (l + 1 < used_) {
       Level const& below = levels_[l + 1];
@@ -253,6 +293,9 @@ private:
   std::deque<Level> levels_;  ///< below the fine one; the first `used_` of them
   std::size_t used_ = 0;
   DenseInverse<S> inverse_;
+  Reducer<S> coarse_reducer_;
+  mutable double enough_ = 0;  ///< of this cycle
+  mutable int coarse_count_ = 0;
   MultigridReport report_;
 
   LeafList free_;

@@ -68,10 +68,11 @@ public:
   /// Advances particles by h seconds, or by the part of it that the report says. `scene` is a
   /// Potential over grid.unknowns() with terms over particles; `boundaries` are where they are h
   /// seconds later than `time`. Throws Error if h is not above 0, if a particle is nowhere, or if
-  /// no part of the step can be taken, and leaves the particles as they were.
-  template <class Potential>
+  /// no part of the step can be taken, and leaves the particles as they were. `observer`: of the
+  /// minimiser, none or one.
+  template <class Potential, class... Observer>
   auto step(Potential& scene, Grid& grid, Particles<Precision, Space> const& particles, double h,
-            BoundaryList<Space>& boundaries, double time = 0) {
+            BoundaryList<Space>& boundaries, double time = 0, Observer const&... observer) {
     if (!(h > 0) || !std::isfinite(h)) throw Error("a step of {} s; give one above 0", h);
     int materials = std::numeric_limits<int>::max();
     scene.for_each_term([&](auto const& term) {
@@ -107,7 +108,7 @@ public:
         }
       });
       start(grid);
-      report.minimiser = stepper_.step(scene, state_, h);
+      report.minimiser = stepper_.step(scene, state_, h, observer...);
       bool const finite = report.minimiser.stop != decltype(report.minimiser.stop)::non_finite;
       double const allowed = params_.crossing * grid.dx();
       double travel = std::numeric_limits<double>::infinity();

@@ -312,6 +312,8 @@ public:
                           kernels::Relag<Space, Precision>{views_, boundaries_, x}) > 0;
   }
 
+  static constexpr bool couples = false;  ///< nodes (UncoupledTerm)
+
   double value(Positions const& x, double scale) const { return scale * sum(x, {}, 0, 0); }
   double change(Positions const& x, Vectors const& p, double alpha, double scale) const {
     return scale * sum(x, p, 1, alpha);

@@ -79,6 +79,31 @@ struct RecursionStep {
   }
 };
 
+/// The same in two parts, around z = M r: r = b, or r - y.
+template <class S, class T>
+struct RecursionResidual {
+  VectorField<T, S> b, r, y;
+  bool first;
+  KOKKOS_FUNCTION void operator()(int i) const {
+    for (int c = 0; c < 3; ++c) r(i, c) = first ? b(i, c) : r(i, c) - y(i, c);
+  }
+};
+/// d = keep d + take z, x += d.
+template <class S, class T>
+struct RecursionUpdate {
+  VectorField<T, S> z, d, x;
+  T keep, take;
+  bool first;
+  KOKKOS_FUNCTION void operator()(int i) const { step(i); }
+  [[gnu::noinline]] KOKKOS_FUNCTION void step(int i) const {
+    for (int c = 0; c < 3; ++c) {
+      T const next = keep == 0 ? take * z(i, c) : take * z(i, c) + keep * d(i, c);
+      d(i, c) = next;
+      x(i, c) = first ? next : x(i, c) + next;
+    }
+  }
+};
+
 /// r -= y
 template <class S, class T>
 struct SubtractProduct {
@@ -256,7 +281,7 @@ private:
       a.product(v.x, v.y);
       for_each<S>("chebyshev_start", a.size(), kernels::ConvertVectors<S, T, T>{v.b, v.r});
     }
-    for_each<S>("chebyshev_step", a.size(), step);
+    take(a, step);
     step.first = false;
     for (int k = 1; k < params_.degree; ++k) {
       double const next = 1 / (2 * middle / half - rho);
@@ -264,6 +289,19 @@ private:
       step.take = T(2 * next / half);
       rho = next;
       a.product(v.d, v.y);
+      take(a, step);
+    }
+  }
+  template <class A, class T, class S>
+  static void take(A const& a, kernels::RecursionStep<S, T> const& step) {
+    if constexpr (PreconditionedLevel<A>) {
+      for_each<S>("chebyshev_residual", a.size(),
+                  kernels::RecursionResidual<S, T>{step.b, step.r, step.y, step.first});
+      auto const z = a.preconditioned(step.r);
+      for_each<S>(
+          "chebyshev_step", a.size(),
+          kernels::RecursionUpdate<S, T>{z, step.d, step.x, step.keep, step.take, step.first});
+    } else {
       for_each<S>("chebyshev_step", a.size(), step);
     }
   }

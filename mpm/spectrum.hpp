@@ -66,6 +66,17 @@ struct LanczosDirection {
   }
 };
 
+/// r -= alpha y
+template <class S, class T>
+struct LanczosReduce {
+  VectorField<T, S> r, y;
+  T alpha;
+  KOKKOS_FUNCTION void operator()(int i) const {
+    if (alpha == 0) return;
+    for (int c = 0; c < 3; ++c) r(i, c) -= alpha * y(i, c);
+  }
+};
+
 template <class S, class T>
 struct VectorDot {
   VectorField<T, S> a, b;
@@ -78,6 +89,15 @@ struct VectorDot {
 
 }  // namespace kernels
 
+/// `A` has a preconditioner of its own in the place of D^-1: z = M r, kept until the next call.
+template <class A>
+concept PreconditionedLevel = LevelOperator<A> &&
+    requires(A const& a, VectorField<typename A::Scalar, typename A::Space> const& r) {
+  {
+    a.preconditioned(r)
+    } -> std::convertible_to<VectorField<typename A::Scalar, typename A::Space>>;
+};
+
 /// The largest eigenvalue of D^-1 A, from below. Uses the vectors r, d and y.
 template <LevelOperator A, class T, class S>
 double largest_eigenvalue(A const& a, LevelVectors<T, S> const& v, int steps = 8) {
@@ -87,10 +107,20 @@ double largest_eigenvalue(A const& a, LevelVectors<T, S> const& v, int steps = 8
   for_each<S>("lanczos_start", n, kernels::ScatterNumbers<S, T>{a.nodes(), v.r});
   std::vector<double> diagonal, beside;
   kernels::LanczosResidual<S, T> residual{a.inverse(), v.r, v.y, T(0)};
-  double rho = reducer.template sum<1>("lanczos_residual", n, residual)[0];
+  VectorField<T, S> z = v.y;
+  auto const reduce = [&] {
+    if constexpr (PreconditionedLevel<A>) {
+      for_each<S>("lanczos_reduce", n, kernels::LanczosReduce<S, T>{v.r, v.y, residual.alpha});
+      z = a.preconditioned(v.r);
+      return reducer.template sum<1>("lanczos_residual", n, kernels::VectorDot<S, T>{v.r, z})[0];
+    } else {
+      return reducer.template sum<1>("lanczos_residual", n, residual)[0];
+    }
+  };
+  double rho = reduce();
   double beta = 0, alpha_before = 1;
   for (int k = 0; k < steps; ++k) {
-    for_each<S>("lanczos_direction", n, kernels::LanczosDirection<S, T>{v.y, v.d, T(beta)});
+    for_each<S>("lanczos_direction", n, kernels::LanczosDirection<S, T>{z, v.d, T(beta)});
     a.product(v.d, v.y);
     double const form =
         reducer.template sum<1>("lanczos_form", n, kernels::VectorDot<S, T>{v.d, v.y})[0];
@@ -98,7 +128,7 @@ double largest_eigenvalue(A const& a, LevelVectors<T, S> const& v, int steps = 8
     double const alpha = rho / form;
     diagonal.push_back(1 / alpha + beta / alpha_before);
     residual.alpha = T(alpha);
-    double const next = reducer.template sum<1>("lanczos_residual", n, residual)[0];
+    double const next = reduce();
     beta = next / rho;
     beside.push_back(std::sqrt(std::max(beta, 0.0)) / alpha);
     alpha_before = alpha;

@@ -36,9 +36,39 @@ std::size_t not_finite(std::vector<Point> const& field) {
 }
 }  // namespace
 
+namespace {
+
+/// Material points: what is not finite, and J <= 0.
+int check_particles(ResultReader const& reader) {
+  ResultMesh const& all = reader.mesh();
+  std::int64_t bad = 0;
+  for (std::int64_t frame = 0; frame < reader.frames(); ++frame) {
+    std::size_t lost = not_finite(reader.positions(frame));
+    if (reader.has_velocities()) lost += not_finite(reader.velocities(frame));
+    auto const J = reader.scalar("J", frame);
+    std::size_t inverted = 0, first = 0;
+    for (std::size_t p = all.particles; p-- > 0;) {
+      if (J[p] > 0) continue;  // what is not a number counts as inverted
+      ++inverted;
+      first = p;
+    }
+    if (inverted == 0 && lost == 0) continue;
+    ++bad;
+    fmt::print("frame {} ({:.6g} s): {} inverted particles{}, {} values not finite\n", frame,
+               reader.times()[frame], inverted,
+               inverted == 0 ? "" : fmt::format(" (first: {})", first), lost);
+  }
+  fmt::print("{} frames of {} particles: {}\n", reader.frames(), all.particles,
+             bad == 0 ? "clean" : fmt::format("{} with faults", bad));
+  return bad == 0 ? 0 : 1;
+}
+
+}  // namespace
+
 int check_command(std::filesystem::path const& result, bool intersections) {
   ResultReader const reader(result_file(result));
   ResultMesh const& all = reader.mesh();
+  if (all.particles > 0) return check_particles(reader);
   TetMesh const& mesh = all.mesh;
   std::optional<ObjectIntersections> surface;
   if (intersections) surface.emplace(all);

@@ -3,6 +3,8 @@
 #include <taut/apps/program/commands.hpp>
 #include <taut/apps/program/memory.hpp>
 #include <taut/apps/program/methods.hpp>
+#include <taut/apps/program/particle_geometry.hpp>
+#include <taut/apps/program/particle_methods.hpp>
 #include <taut/apps/program/scene_geometry.hpp>
 #include <taut/core/fem/rest_shape.hpp>
 #include <taut/core/report/error.hpp>
@@ -11,7 +13,9 @@
 #include <fmt/ranges.h>
 
 #include <algorithm>
+#include <cmath>
 #include <cstdlib>
+#include <limits>
 #include <map>
 #include <set>
 
@@ -125,11 +129,72 @@ void print_contact(Scene const& scene) {
                                                   : "certified, nothing crosses");
 }
 
+/// The plan of a scene of material points.
+int plan_particles(Scene const& scene) {
+  ParticleScene const& points = *scene.particles;
+  SceneParticles const particles = build_particles(scene);
+  SolverOptions const& solver = scene.solver;
+  fmt::print("{}: {}\n", scene.name, scene.description);
+  fmt::print("  {} particles of {} object{}, a grid of {:.4g} m; {} boundar{}\n",
+             particles.list.size(), points.bodies.size(), points.bodies.size() == 1 ? "" : "s",
+             points.spacing, points.boundaries.size(), points.boundaries.size() == 1 ? "y" : "ies");
+  fmt::print("terms of the potential\n");
+  fmt::print(
+      "  inertia       carries the motion on: {} between particles and grid, implicit Euler\n",
+      points.transfer);
+  fmt::print("{}", scene.gravity != Point{} ? "  body force    pulls: gravity\n"
+                                            : "  (no body force: no gravity)\n");
+  double stiffest = 0, softest = std::numeric_limits<double>::infinity(), fastest = 0;
+  for (std::size_t m = 0; m < particles.materials.size(); ++m) {
+    MaterialParameters const& one = particles.materials[m];
+    stiffest = std::max(stiffest, one.young);
+    softest = std::min(softest, one.young);
+    fastest = std::max(fastest, std::sqrt(one.young / one.density));
+    fmt::print(
+        "  particles     resist deformation: {}, {:.3g} Pa{}\n", one.model, one.young,
+        particles.flows[m].kind == FlowKind::none
+            ? ""
+            : fmt::format("; after a step {} takes what they cannot bear",
+                          plasticity_kinds()[static_cast<std::size_t>(particles.flows[m].kind)]));
+  }
+  bool const slips = std::any_of(points.boundaries.begin(), points.boundaries.end(),
+                                 [](auto const& b) { return b.law != BoundaryLaw::stick; });
+  fmt::print("{}",
+             slips ? "  slip          holds nodes back that are in boundaries which do not stick\n"
+                   : "  (no slip: no boundary slips or separates)\n");
+  double const longest = points.longest_step.value_or(scene.step);
+  fmt::print(
+      "steps\n  frames of {:.4g} s, in steps of the grid of at most {:.4g} s or {:.3g} cells; "
+      "halved where a particle would cross {:.3g}\n",
+      scene.step, longest, points.cfl, points.crossing);
+  fmt::print("minimiser\n");
+  for (MethodTitle const& title : method_titles())
+    if (title.name == solver.text("method"))
+      fmt::print("  method        finds the direction: {}, {}\n", title.name, title.description);
+  fmt::print("  metric        evens out stiffness and mass: {}\n", particle_preconditioner(solver));
+  fmt::print("  curvature     is projected exactly, particle by particle\n");
+  fmt::print("  line search   says how far to go: {}\n", solver.text("line_search"));
+  fmt::print("  stop          {}: {}; at most {} iterations\n", solver.text("stopping"),
+             stop_of(solver, points.spacing, longest, false), solver.integer("max_iterations"));
+  fmt::print("advice\n  the fastest wave crosses {:.2g} cells per step\n",
+             fastest * longest / points.spacing);
+  if (stiffest > 100 * softest) {
+    fmt::print("  stiffness varies by {:.1e}: compare with method = \"newton\"\n",
+               stiffest / softest);
+  }
+  for (std::string const& warning : particles.warnings) fmt::print("warning: {}\n", warning);
+  return 0;
+}
+
 }  // namespace
 
 int methods_command() {
   fmt::print("solver.method: what minimises the energy of a step\n");
   for (MethodTitle const& m : method_titles()) fmt::print("  {:<11} {}\n", m.name, m.description);
+  fmt::print("solver.method, of material points: nonlinear CG and newton as above, and\n");
+  for (MethodTitle const& m : particle_method_titles()) {
+    fmt::print("  {:<13} {}\n", m.name, m.description);
+  }
   for (OptionKey const& key : solver_keys()) {
     if (key.name != "method") print_key("solver", key);
   }
@@ -139,11 +204,14 @@ int methods_command() {
     fmt::print("  {:<24} {}\n  {:<24} {}\n", model.name, model.description, "",
                model.allows_inversion ? "tolerates inverted elements" : "keeps J > 0");
   }
+  fmt::print("of material points ([grid]): {}; plasticity.kind: {}\n",
+             fmt::join(particle_models(), ", "), fmt::join(plasticity_kinds(), ", "));
   return 0;
 }
 
 int plan_command(SceneArguments const& arguments) {
   Scene const scene = load_scene(find_scene(arguments.scene), arguments.changes);
+  if (scene.particles) return plan_particles(scene);
   SceneGeometry const geometry = build_geometry(scene);
   SolverOptions const& solver = scene.solver;
   double const h = scene.step, edge = mean_edge_length(geometry.mesh);

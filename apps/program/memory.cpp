@@ -220,6 +220,7 @@ void require_memory(MeshSize const& size, SolverOptions const& solver) {
 }
 
 SceneGeometry build_within_memory(Scene const& scene) {
+  if (scene.particles) return build_geometry(scene);  // says that there are no meshes
   MeshSize const expected = estimate_size(scene);
   require_memory(expected, scene.solver);
   if (expected.tets > 2e6) {

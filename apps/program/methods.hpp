@@ -4,6 +4,7 @@
 
 #include <taut/apps/program/any_policies.hpp>
 #include <taut/apps/program/elastic_terms.hpp>
+#include <taut/apps/program/method_title.hpp>
 #include <taut/apps/program/scene_options.hpp>
 #include <taut/core/potential/potential.hpp>
 #include <taut/integrators/newton.hpp>
@@ -11,19 +12,12 @@
 
 #include <memory>
 #include <span>
-#include <string_view>
 
 namespace taut {
 
 template <class P>
 using ProgramPotential =
     Potential<Inertia<P>, BodyForce<P>, ProgramTerms<P>, AnySteppedTerms<P, DefaultSpace>>;
-
-struct MethodTitle {
-  std::string_view name;         ///< value of solver.method
-  std::string_view title;        ///< for charts
-  std::string_view description;  ///< one line
-};
 
 /// All methods, in the order in which they are listed and drawn.
 std::span<MethodTitle const> method_titles();

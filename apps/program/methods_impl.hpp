@@ -2,6 +2,8 @@
 #pragma once
 
 #include <taut/apps/program/methods.hpp>
+#include <taut/apps/program/option_policies.hpp>
+#include <taut/core/report/error.hpp>
 #include <taut/integrators/any_preconditioner.hpp>
 #include <taut/integrators/chebyshev.hpp>
 #include <taut/integrators/direct.hpp>
@@ -40,6 +42,12 @@ public:
     }
     using Minimiser = Ncg<AnyBeta, AnyPreconditioner, AnyLineSearch, AnyStopping, P, Space>;
     typename Minimiser::Params params;
+    if (method.starts_with("hot") || method.starts_with("pn_") || method == "lbfgs_h") {
+      throw Error(
+          "solver.method = \"{}\" is of scenes of material points: choose lbfgs, newton, chebyshev "
+          "or a nonlinear CG",
+          method);
+    }
     params.beta = AnyBeta(method);
     return hold<Minimiser>(params);
   }
@@ -64,8 +72,8 @@ private:
   template <class Minimiser>
   std::unique_ptr<Interface> hold(typename Minimiser::Params params) const {
     params.preconditioner = preconditioner();
-    params.line_search = line_search();
-    params.stop = stopping(window(8));
+    params.line_search = line_search_of(options_);
+    params.stop = stopping_of(options_, 8);
     params.budget.max_iterations = options_.integer("max_iterations");
     params.safeguard.on = options_.flag("safeguard");
     if constexpr (requires { params.splitting; }) {
@@ -78,7 +86,7 @@ private:
   std::unique_ptr<Interface> newton() const {
     using Minimiser = Newton<Linear, AnyPreconditioner, AnyLineSearch, AnyStopping, P, Space>;
     typename Minimiser::Params params;
-    params.line_search = line_search();
+    params.line_search = line_search_of(options_);
     if (auto* armijo = std::get_if<SufficientDecrease::Params>(&params.line_search)) {
       armijo->max_backtracks = newton_backtracks;
     }
@@ -87,53 +95,31 @@ private:
       params.linear.max_iterations = options_.integer("max_linear_iterations");
     }
     params.forcing.largest = options_.number("linear_tolerance");
-    params.stop = stopping(window(1));
+    params.stop = stopping_of(options_, 1);
     params.budget.max_iterations = options_.integer("max_iterations");
     params.safeguard.on = options_.flag("safeguard");
     return std::make_unique<Holder<Minimiser>>(params);
   }
 
-  int window(int of_method) const {
-    int const chosen = options_.integer("window");
-    return chosen > 0 ? chosen : of_method;
-  }
-
-  Refresh refresh(std::string_view of_preconditioner) const {
-    std::string_view when = options_.text("refresh");
-    if (when == "auto") when = of_preconditioner;
-    if (when == "lagged") return Refresh::lagged(options_.integer("refresh_every"));
-    if (when == "rare") {
-      return {.interval = options_.integer("refresh_every"), .trigger = Refresh::rarely().trigger};
-    }
-    return {};
-  }
-
   typename Preconditioner::Params preconditioner() const {
     std::string const& name = options_.text("preconditioner");
+    Refresh const refresh = refresh_of(options_, {});
     if (name == "identity") return typename Identity<P, Space>::Params{};
-    if (name == "jacobi") return typename Jacobi<P, Space>::Params{.refresh = refresh("always")};
+    if (name == "jacobi") return typename Jacobi<P, Space>::Params{.refresh = refresh};
     if (name == "block_jacobi" || name == "auto") {  // where there is no scene to choose for
-      return typename BlockJacobi<P, Space>::Params{.refresh = refresh("always")};
+      return typename BlockJacobi<P, Space>::Params{.refresh = refresh};
+    }
+    if (name == "multigrid") {
+      throw Error(
+          "solver.preconditioner = \"multigrid\" needs the nodes of a grid, which a scene of "
+          "meshes "
+          "does not have: choose schwarz_32, or add a table [grid]");
     }
     typename Schwarz<P, Space>::Params schwarz;
-    schwarz.refresh = refresh("rare");
+    schwarz.refresh = refresh_of(options_, {.interval = options_.integer("refresh_every"),
+                                            .trigger = Refresh::rarely().trigger});
     schwarz.aggregate = name == "schwarz_16" ? 16 : 32;
     return schwarz;
-  }
-
-  AnyLineSearch::Params line_search() const {
-    std::string const& name = options_.text("line_search");
-    if (name == "newton") return NewtonStep::Params{};
-    if (name == "exact") return ExactLineSearch::Params{};
-    return SufficientDecrease::Params{};
-  }
-
-  AnyStopping::Params stopping(int window) const {
-    std::string const& name = options_.text("stopping");
-    double const tolerance = options_.number("tolerance");
-    if (name == "energy_drop") return EnergyDrop::Params{.tolerance = tolerance};
-    if (name == "gradient_norm") return GradientNorm::Params{tolerance, true};
-    return DecrementWindow::Params{.tolerance = name == "budget" ? 0 : tolerance, .window = window};
   }
 
   SolverOptions const& options_;

@@ -51,8 +51,10 @@ void add(Hash& hash, std::vector<T> const& values) {
 
 }  // namespace
 
-std::string run_identity(SceneChanges const& changes, Scene const& scene,
-                         SceneGeometry const& geometry) {
+namespace {
+
+/// The keys that a result depends on.
+std::string text_of(SceneChanges const& changes, Scene const& scene) {
   SceneValue document = read_document(scene.file);
   if (changes.small) apply_small(document);
   for (std::string const& assignment : changes.overrides) apply_override(document, assignment);
@@ -60,7 +62,13 @@ std::string run_identity(SceneChanges const& changes, Scene const& scene,
   if (SceneValue* time = document.find("time")) erase(*time, "frames");
   std::string text;
   std::visit(Write{text}, document.value);
+  return text;
+}
 
+}  // namespace
+
+std::string run_identity(SceneChanges const& changes, Scene const& scene,
+                         SceneGeometry const& geometry) {
   Hash hash;
   add(hash, geometry.mesh.points);
   add(hash, geometry.mesh.tets);
@@ -77,7 +85,21 @@ std::string run_identity(SceneChanges const& changes, Scene const& scene,
     add(hash, surface.mesh.points);
     add(hash, surface.mesh.triangles);
   }
-  return text + fmt::format("\nevery = {}\nmeshes {:016x}\n", scene.output.every, hash.value());
+  return text_of(changes, scene) +
+         fmt::format("\nevery = {}\nmeshes {:016x}\n", scene.output.every, hash.value());
+}
+
+std::string run_identity(SceneChanges const& changes, Scene const& scene,
+                         SceneParticles const& particles) {
+  std::vector<double> numbers;
+  for (Particle const& p : particles.list) {
+    for (int c = 0; c < 3; ++c) numbers.push_back(p.x[c]);
+    numbers.push_back(p.mass);
+  }
+  Hash hash;
+  add(hash, numbers);
+  return text_of(changes, scene) +
+         fmt::format("\nevery = {}\nparticles {:016x}\n", scene.output.every, hash.value());
 }
 
 }  // namespace taut

@@ -30,6 +30,8 @@ struct MaterialModel {
   std::string_view description;
 };
 std::span<MaterialModel const> material_models();
+/// Those that are compiled for material points; the first is the default.
+std::span<std::string_view const> particle_models();
 
 /// v(x) = linear + w a x (x - centre); with a twist length L the rate w varies along the axis as
 /// w sin(pi s / 2L), s = a . (x - centre).
@@ -137,6 +139,68 @@ struct SceneForce {
   Window window;
 };
 
+/// What takes stresses that a material of points cannot bear away after a step (docs/scenes.md).
+struct Plasticity {
+  std::string kind = "none";  ///< a name of `plasticity_kinds()`
+  double yield_stress = 0;    ///< of the metals, Pa
+  double hardening = 0;       ///< of von_mises: Pa per plastic strain; of snow: psi
+  double compression = 0, stretch = 0, least = 0, most = 0;  ///< of snow
+  double angle = 0;                                          ///< of sand, degrees
+};
+std::span<std::string_view const> plasticity_kinds();
+
+/// F of a particle at time 0 is diagonal, each entry random in this interval.
+struct StartStretched {
+  double least, most;
+  int seed = 1;
+};
+
+/// A body of material points. Analytic solids have the sizes of shapes; a file is a closed surface
+/// (.obj) or a level set (.vdb).
+struct SceneBody {
+  std::string where;
+  std::string name;
+  std::variant<Shape, std::filesystem::path> geometry;
+  double scale = 1;    ///< scaled, then rotated about the origin, then translated
+  RigidMap placement;  ///< rotation and translation
+  InitialVelocity velocity;
+  MaterialParameters material;
+  Plasticity plasticity;
+  double per_cell = 8;               ///< particles in a cell
+  double max_holes = 0;              ///< share of the edges of a surface that may be at holes
+  std::vector<std::string> without;  ///< names of bodies that are cut out of it
+  std::optional<StartStretched> start;
+};
+
+enum class BoundaryLaw { stick, slip, separate };
+
+/// What holds the nodes of the grid: solid inside of its shape, or outside.
+struct SceneBoundary {
+  std::string where;
+  std::string name;
+  std::variant<HalfSpaceShape, Shape> shape;  ///< in a frame of its own
+  bool inside = false;                        ///< the bodies are inside of it
+  BoundaryLaw law = BoundaryLaw::stick;
+  double friction = 0;
+  RigidMap placement;             ///< at time 0
+  RigidMotion motion;             ///< from there
+  std::optional<double> release;  ///< s, when it is taken away; not of half spaces and containers
+};
+
+/// A scene of material points instead of meshes.
+struct ParticleScene {
+  double spacing = 0;                  ///< of the grid, m; holds the scene's resolution already
+  std::string transfer = "apic";       ///< apic, rpic, flip
+  double flip = 0.95;                  ///< of transfer = "flip"
+  double cfl = 0.6, crossing = 1;      ///< cells (mpm/particle_stepper.hpp)
+  std::optional<double> longest_step;  ///< s; a frame if not given
+  int halvings = 10;
+  int seed = 1;  ///< of the places of particles
+  bool check_overlap = true;
+  std::vector<SceneBody> bodies;
+  std::vector<SceneBoundary> boundaries;
+};
+
 struct OutputOptions {
   int every = 1;      ///< frames between written frames
   bool obj = false;   ///< also a surface per written frame
@@ -167,6 +231,7 @@ struct Scene {
   OutputOptions output;
   std::optional<Sweep> sweep;
   std::vector<std::string> warnings;
+  std::optional<ParticleScene> particles;  ///< in place of objects, obstacles, pins and contact
 };
 
 struct SceneChanges {

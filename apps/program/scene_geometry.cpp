@@ -242,6 +242,12 @@ void add_obstacles(Scene const& scene, SceneGeometry& geometry) {
 }  // namespace
 
 SceneGeometry build_geometry(Scene const& scene) {
+  if (scene.particles) {
+    throw Error(
+        "{}: the scene is made of material points ([grid]), and this command knows meshes alone: "
+        "choose a scene without [grid]",
+        scene.file.string());
+  }
   SceneGeometry geometry;
   geometry.warnings = scene.warnings;
   for (SceneObject const& object : scene.objects) add_object(object, geometry);

@@ -63,10 +63,47 @@ void warn_of_resolution(Scene& scene) {
                   scene.file.string(), scene.resolution));
 }
 
+/// What scenes of all kinds have at their end.
+void read_rest(Section const& root, Scene& scene) {
+  if (auto const solver = root.section("solver")) scene.solver = SolverOptions(*solver);
+  if (auto const output = root.section("output")) scene.output = read_output(*output);
+  if (auto const sweep = root.section("sweep")) scene.sweep = read_sweep(*sweep);
+}
+
+/// A scene with a table [grid].
+Scene resolve_particles(Section const& root, Scene scene) {
+  for (char const* key : {"obstacle", "pin", "force", "contact"}) {
+    SceneValue const* found = root.find(key);
+    if (found == nullptr) continue;
+    throw Error(
+        "{}: {} is for meshes, and this scene has a [grid], which makes its objects material "
+        "points: use [[boundary]], or leave [grid] out",
+        found->place, key);
+  }
+  if (scene.scheme != TimeScheme::implicit_euler)
+    throw Error(
+        "{}: time.integrator: material points are stepped by implicit_euler alone: their grid has "
+        "no past; leave the key out",
+        root.at("time").place);
+  scene.particles = read_particle_scene(root, scene);
+  read_rest(root, scene);
+  auto const solver = root.section("solver");
+  // One cycle per iteration answers to stiffness: L-BFGS learns the rest.
+  if (!solver || solver->find("method") == nullptr) scene.solver.set("method", "lbfgs");
+  std::string const& precision = scene.solver.text("precision");
+  if (precision != "fp64")
+    throw Error(
+        "{}: solver.precision = \"{}\" is compiled for meshes alone: material points take fp64",
+        root.place(), precision);
+  if (scene.solver.number("sleep_speed") > 0)
+    throw Error("{}: solver.sleep_speed is of meshes: leave it out", root.place());
+  return scene;
+}
+
 Scene resolve(SceneValue const& document, std::filesystem::path const& file) {
   Section const root(document, "");
   root.allow({"name", "description", "base", "gravity", "resolution", "time", "object", "obstacle",
-              "pin", "force", "contact", "solver", "output", "small", "sweep"});
+              "pin", "force", "contact", "solver", "output", "small", "sweep", "grid", "boundary"});
   Scene scene;
   scene.file = file;
   scene.name = root.text("name", file.stem().string());
@@ -75,6 +112,12 @@ Scene resolve(SceneValue const& document, std::filesystem::path const& file) {
   scene.resolution =
       root.number("resolution", {.min = 0, .max = 1e3, .open_min = true}, scene.resolution);
   read_time(Section(root.at("time"), "time"), scene);
+  if (root.find("grid") != nullptr) return resolve_particles(root, std::move(scene));
+  if (SceneValue const* boundary = root.find("boundary"))
+    throw Error(
+        "{}: a [[boundary]] holds the nodes of a grid, which a scene of meshes does not have: add "
+        "a table [grid], or make it an [[obstacle]]",
+        boundary->place);
   for (Section const& object : root.list("object"))
     for (SceneObject& copy : read_object(object, scene)) scene.objects.push_back(std::move(copy));
   if (scene.objects.empty())
@@ -85,10 +128,8 @@ Scene resolve(SceneValue const& document, std::filesystem::path const& file) {
   warn_of_resolution(scene);
   for (Section const& pin : root.list("pin")) scene.pins.push_back(read_pin(pin, scene));
   for (Section const& force : root.list("force")) scene.forces.push_back(read_force(force, scene));
-  if (auto const solver = root.section("solver")) scene.solver = SolverOptions(*solver);
   if (auto const contact = root.section("contact")) scene.contact = ContactOptions(*contact);
-  if (auto const output = root.section("output")) scene.output = read_output(*output);
-  if (auto const sweep = root.section("sweep")) scene.sweep = read_sweep(*sweep);
+  read_rest(root, scene);
   return scene;
 }
 

@@ -9,9 +9,11 @@ std::span<OptionKey const> solver_keys() {
       {"method",
        std::string("dk"),
        {},
-       {"dk", "dk+", "hz", "hs", "prp", "prp+", "ls", "fr", "cd", "bfgs", "lbfgs", "chebyshev",
-        "newton", "gradient"},
-       "the minimiser: nonlinear conjugate gradients by its beta, or another one"},
+       {"dk",      "dk+",    "hz",        "hs",        "prp",    "prp+",     "ls",  "fr",
+        "cd",      "bfgs",   "lbfgs",     "chebyshev", "newton", "gradient", "hot", "hot_quadratic",
+        "lbfgs_h", "pn_pcg", "pn_pcg_mf", "pn_mgpcg"},
+       "the minimiser: nonlinear conjugate gradients by its beta, or another one; a scene of "
+       "material points that does not say takes lbfgs"},
       {"precision",
        std::string("fp64"),
        {},
@@ -20,16 +22,19 @@ std::span<OptionKey const> solver_keys() {
       {"preconditioner",
        std::string("auto"),
        {},
-       {"auto", "identity", "jacobi", "block_jacobi", "schwarz_16", "schwarz_32"},
-       "schwarz: dense aggregates of 16 or 32 vertices with a coarse level; auto: schwarz_32 where "
+       {"auto", "identity", "jacobi", "block_jacobi", "schwarz_16", "schwarz_32", "multigrid"},
+       "schwarz: dense aggregates of 16 or 32 vertices with a coarse level, of meshes; multigrid: "
        "a "
-       "step reaches over several elements, otherwise block_jacobi (`taut plan` says why)"},
+       "cycle over the nodes of a grid, of material points; auto: multigrid for these, and for "
+       "meshes schwarz_32 where a step reaches over several elements, otherwise block_jacobi "
+       "(`taut plan` says why)"},
       {"refresh",
        std::string("auto"),
        {},
        {"auto", "always", "lagged", "rare"},
        "when the preconditioner is rebuilt: at each iterate; every refresh_every; the same and "
-       "where the steps collapse; auto: rare for schwarz, always for the others"},
+       "where the steps collapse; auto: rare for schwarz, every 8 iterations for multigrid, always "
+       "for the others"},
       {"refresh_every",
        30,
        {.min = 1, .max = 1e6},
@@ -48,16 +53,17 @@ std::span<OptionKey const> solver_keys() {
       {"stopping",
        std::string("decrement_window"),
        {},
-       {"decrement_window", "energy_drop", "gradient_norm", "budget"},
+       {"decrement_window", "energy_drop", "gradient_norm", "characteristic_norm", "budget"},
        "what ends a step: sum of the last energy decrements below 1/2 M (tolerance L)^2; energy "
-       "drop "
-       "relative to the first; gradient norm relative to the first; max_iterations alone"},
+       "drop relative to the first; gradient norm relative to the first; HOT's norm, of material "
+       "points (its authors take a tolerance of 1e-7); max_iterations alone"},
       {"tolerance", 1e-3, {.min = 0, .max = 1, .open_min = true}, {}, "of the stopping rule"},
       {"window",
        0,
        {.min = 0, .max = 1000},
        {},
-       "decrements summed at least by decrement_window; 0: 8, or 1 for newton"},
+       "decrements summed at least by decrement_window; 0: 8, or 4 with multigrid, or 1 for "
+       "newton"},
       {"max_iterations", 2000, {.min = 1, .max = 1e9}, {}, "budget of a time step"},
       {"history", 8, {.min = 1, .max = max_lbfgs_window}, {}, "pairs kept by lbfgs"},
       {"chebyshev_rho",

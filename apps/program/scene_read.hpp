@@ -36,6 +36,16 @@ Selection read_selection(Section const& parent, std::filesystem::path const& sce
 /// One object, or all copies of it.
 std::vector<SceneObject> read_object(Section const& section, Scene const& scene);
 SceneObstacle read_obstacle(Section const& section, Scene const& scene);
+/// The table `velocity` of an object.
+InitialVelocity read_velocity(Section const& section);
+/// The ways from an object to its copies, itself among them; names are NAME-0, ... if `named`.
+struct Copies {
+  std::vector<Point> ways{Point{}};  ///< m
+  bool named = false;
+};
+Copies read_copies(Section const& object);
+/// Everything that a scene of material points has besides what all scenes have.
+ParticleScene read_particle_scene(Section const& root, Scene const& scene);
 ScenePin read_pin(Section const& section, Scene const& scene);
 SceneForce read_force(Section const& section, Scene const& scene);
 

@@ -38,19 +38,6 @@ MaterialParameters read_material(Section const& section, MaterialParameters cons
   return material;
 }
 
-InitialVelocity read_velocity(Section const& section) {
-  section.allow({"linear", "axis", "centre", "angular_velocity", "twist_length"});
-  InitialVelocity velocity;
-  velocity.linear = section.point("linear", "m/s", velocity.linear);
-  velocity.axis = section.direction("axis", velocity.axis);
-  velocity.centre = section.point("centre", "m", velocity.centre);
-  velocity.angular_velocity =
-      radians(section.number("angular_velocity", {.min = -1e9, .max = 1e9, .unit = "deg/s"}, 0.0));
-  if (section.find("twist_length"))
-    velocity.twist_length = section.number("twist_length", length_range);
-  return velocity;
-}
-
 /// start = "rest" | "flat" | "random", or a table whose `kind` is one of them.
 Start read_start(Section const& object) {
   constexpr std::array<std::string_view, 3> kinds{"rest", "flat", "random"};
@@ -95,11 +82,38 @@ void require_start_allowed(SceneObject const& object) {
   for (SceneRegion const& region : object.regions) check(region.material);
 }
 
-/// copies = { count = [nx, ny, nz], step = [dx, dy, dz] }: a block of them, name-0 where the object
-/// itself is, numbered along x first. The centre of its velocity moves along.
-std::vector<SceneObject> copies_of(SceneObject const& object, Section const& section) {
-  auto const copies = section.section("copies");
-  if (!copies) return {object};
+}  // namespace
+
+std::span<MaterialModel const> material_models() {
+  static constexpr std::array<MaterialModel, 5> models{
+      {{"stable_neo_hookean", true,
+        "as in the PNCG paper: cheapest; nu above 1/8; softer in volume than its nu says "
+        "(default)"},
+       {"stable_neo_hookean_2018", true, "Smith et al. 2018: nominal moduli at small strain"},
+       {"neo_hookean", false, "with a logarithm of J, which no step may bring to zero"},
+       {"fixed_corotated", true, "Stomakhin et al. 2012: needs the rotation of F"},
+       {"arap", true, "as rigid as possible: mu alone, Poisson's ratio has no effect"}}};
+  return models;
+}
+
+InitialVelocity read_velocity(Section const& section) {
+  section.allow({"linear", "axis", "centre", "angular_velocity", "twist_length"});
+  InitialVelocity velocity;
+  velocity.linear = section.point("linear", "m/s", velocity.linear);
+  velocity.axis = section.direction("axis", velocity.axis);
+  velocity.centre = section.point("centre", "m", velocity.centre);
+  velocity.angular_velocity =
+      radians(section.number("angular_velocity", {.min = -1e9, .max = 1e9, .unit = "deg/s"}, 0.0));
+  if (section.find("twist_length"))
+    velocity.twist_length = section.number("twist_length", length_range);
+  return velocity;
+}
+
+/// copies = { count = [nx, ny, nz], step = [dx, dy, dz] }: a block of them, the first where the
+/// object itself is, numbered along x first.
+Copies read_copies(Section const& object) {
+  auto const copies = object.section("copies");
+  if (!copies) return {};
   copies->allow({"count", "step"});
   std::string const path = copies->path("count");
   SceneValue::List const& list = read_list(copies->at("count"), path);
@@ -123,33 +137,13 @@ std::vector<SceneObject> copies_of(SceneObject const& object, Section const& sec
       throw Error("{}: {} is 0 along {}, where there are {} copies: give the way between two",
                   copies->at("step").place, copies->path("step"), "xyz"[a], count[a]);
 
-  std::vector<SceneObject> block;
+  Copies block{{}, true};
   for (std::int64_t k = 0; k < count[2]; ++k)
     for (std::int64_t j = 0; j < count[1]; ++j)
-      for (std::int64_t i = 0; i < count[0]; ++i) {
-        Point const way{static_cast<double>(i) * step[0], static_cast<double>(j) * step[1],
-                        static_cast<double>(k) * step[2]};
-        SceneObject copy = object;
-        copy.name = fmt::format("{}-{}", object.name, block.size());
-        copy.placement.translation = copy.placement.translation + way;
-        copy.velocity.centre = copy.velocity.centre + way;
-        block.push_back(std::move(copy));
-      }
+      for (std::int64_t i = 0; i < count[0]; ++i)
+        block.ways.push_back({static_cast<double>(i) * step[0], static_cast<double>(j) * step[1],
+                              static_cast<double>(k) * step[2]});
   return block;
-}
-
-}  // namespace
-
-std::span<MaterialModel const> material_models() {
-  static constexpr std::array<MaterialModel, 5> models{
-      {{"stable_neo_hookean", true,
-        "as in the PNCG paper: cheapest; nu above 1/8; softer in volume than its nu says "
-        "(default)"},
-       {"stable_neo_hookean_2018", true, "Smith et al. 2018: nominal moduli at small strain"},
-       {"neo_hookean", false, "with a logarithm of J, which no step may bring to zero"},
-       {"fixed_corotated", true, "Stomakhin et al. 2012: needs the rotation of F"},
-       {"arap", true, "as rigid as possible: mu alone, Poisson's ratio has no effect"}}};
-  return models;
 }
 
 std::vector<SceneObject> read_object(Section const& section, Scene const& scene) {
@@ -175,7 +169,17 @@ std::vector<SceneObject> read_object(Section const& section, Scene const& scene)
   }
   object.start = read_start(section);
   require_start_allowed(object);
-  return copies_of(object, section);
+  Copies const copies = read_copies(section);
+  if (!copies.named) return {object};
+  std::vector<SceneObject> block;
+  for (Point const& way : copies.ways) {
+    SceneObject copy = object;
+    copy.name = fmt::format("{}-{}", object.name, block.size());
+    copy.placement.translation = copy.placement.translation + way;
+    copy.velocity.centre = copy.velocity.centre + way;  // moves along
+    block.push_back(std::move(copy));
+  }
+  return block;
 }
 
 }  // namespace taut

@@ -1,10 +1,10 @@
 // A scene made ready to be stepped: the discrete potential, the state and the minimiser, in the
 // precision that the scene asks for. Everything that goes in and comes out is in the order of the
-// scene's mesh.
+// points of the scene's result (result_mesh): of its mesh, or of its particles.
 #pragma once
 
 #include <taut/apps/program/scene_geometry.hpp>
-#include <taut/contact/contact.hpp>
+#include <taut/contact/contact_report.hpp>
 #include <taut/core/io/checkpoint.hpp>
 #include <taut/integrators/newton.hpp>
 
@@ -27,9 +27,9 @@ class Simulation {
 public:
   virtual ~Simulation() = default;
 
-  /// Discretises the scene. Throws Error if it asks for what does not exist, starts with an
-  /// inverted element of a material that forbids it, or has a body smaller than the distance of
-  /// contact.
+  /// Discretises a scene of meshes (of material points: ParticleSimulation). Throws Error if it
+  /// asks for what does not exist, starts with an inverted element of a material that forbids it,
+  /// or has a body smaller than the distance of contact.
   static std::unique_ptr<Simulation> create(Scene const& scene, SceneGeometry const& geometry);
 
   /// One time step. Throws Error if the energy stops being a number, naming the elements, or if
@@ -40,7 +40,7 @@ public:
   virtual int steps() const = 0;
   /// What contact amounts to now; nothing in a scene without.
   virtual std::optional<ContactReport> contact() const = 0;
-  /// Of the scene's mesh, and behind it of the surfaces of obstacles (SceneGeometry).
+  /// Of bodies, and behind them of the surfaces of obstacles and boundaries.
   virtual std::vector<Point> positions() const = 0;   ///< m
   virtual std::vector<Point> velocities() const = 0;  ///< m/s
 

@@ -30,6 +30,10 @@ constexpr Column columns[] = {
     {"scene", [](Summary const& s) { return s.value("scene", std::string("?")); }},
     {"vertices, tets",
      [](Summary const& s) {
+       if (s.contains("particles")) {
+         return fmt::format("{:.0f} nodes, {:.0f} particles", number(s, "nodes"),
+                            number(s, "particles"));
+       }
        return fmt::format("{:.0f}, {:.0f}", number(s, "vertices"), number(s, "tets"));
      }},
     {"steps",

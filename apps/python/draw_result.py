@@ -1,4 +1,5 @@
-"""Draws a result of `taut run`: PNGs of chosen frames and an animation, off screen.
+"""Draws a result of `taut run`: PNGs of chosen frames and an animation, off screen. Bodies are
+surfaces, or material points that are drawn as balls.
 
 The camera stands still and sees the bodies of every frame that is drawn. They are coloured by object,
 or by speed or displacement on one scale for all frames. Obstacles are grey and let the bodies behind
@@ -17,6 +18,8 @@ import matplotlib
 import numpy as np
 import pyvista as pv
 from PIL import Image
+from vtkmodules.vtkCommonCore import vtkIdList
+from vtkmodules.vtkCommonDataModel import vtkStaticPointLocator
 from vtkmodules.vtkIOHDF import vtkHDFReader
 
 from draw_light import Light, frame_of
@@ -31,6 +34,7 @@ MARGIN = 0.92  # the part of the picture that the bodies may fill
 AROUND_BODIES = 0.15  # what is framed of an obstacle: as far from the bodies, in their diagonals
 CELLS = 200  # across the picture of a plane
 PIECE, PIECES = 0.04, 60000  # of triangles: their length, in half diagonals of the bodies; how many
+BALL = 1.5  # diameter of a material point, in distances to the next: no gaps between them
 TITLES = {"speed": "speed, m/s", "displacement": "displacement, m"}
 
 
@@ -115,6 +119,44 @@ class Surface:
         self.fine.Modified()
 
 
+class Points:
+    """Material points, drawn as balls that nearly touch. Has what a Surface has."""
+
+    def __init__(self, grid, cells):
+        self.vertex = np.flatnonzero(cells)  # the cells of particles are their points, in order
+        self.object_of_vertex = np.array(grid["object"])[cells].astype(int)
+        self.mesh = self.fine = pv.PolyData(np.array(grid.points)[self.vertex])
+        self.fine["colour"] = np.zeros((len(self.vertex), 3), dtype=np.uint8)
+        self.spacing = self.typical_distance()
+
+    def typical_distance(self):
+        """To the nearest of the others: the median of some."""
+        locator = vtkStaticPointLocator()
+        locator.SetDataSet(self.mesh)
+        locator.BuildLocator()
+        found, distances = vtkIdList(), []
+        for number in range(0, self.mesh.n_points, max(1, self.mesh.n_points // 500)):
+            point = self.mesh.points[number]
+            locator.FindClosestNPoints(2, point, found)
+            others = [found.GetId(k) for k in range(found.GetNumberOfIds())]
+            distances += [np.linalg.norm(self.mesh.points[k] - point) for k in others if k != number]
+        return float(np.median(distances)) if distances else 1.0
+
+    def move(self, points):
+        self.mesh.points = points[self.vertex]
+
+    def refine(self, length):
+        """They are as fine as they are."""
+
+    def mean(self, values):
+        return values
+
+    def paint(self, light, base, least):
+        """Balls have a light and a dark side of their own; what is deep between others is not seen."""
+        self.fine["colour"][:] = base.round()
+        self.fine.Modified()
+
+
 class Plane:
     """A half space. Three points of its patch say where it is; normals point to the bodies."""
 
@@ -167,7 +209,8 @@ class Frames:
         self.rest = np.array(grid.points)
         objects = np.array(grid["object"]).astype(int)
         kind = np.array(kinds)[objects]
-        self.bodies = Surface(grid, kind == BODY)
+        self.of_points = bool((grid.celltypes[kind == BODY] == pv.CellType.VERTEX).all())
+        self.bodies = (Points if self.of_points else Surface)(grid, kind == BODY)
         self.obstacles = Surface(grid, kind == TOUCHED) if (kind == TOUCHED).any() else None
         self.planes, room = [], np.zeros(len(objects), dtype=bool)
         for number in np.unique(objects[kind == DRAWN_ONLY]):
@@ -257,6 +300,16 @@ class Picture:
                                       "color": "#333333", "n_labels": 3, "title_font_size": font,
                                       "label_font_size": font, "width": 0.05, "height": 0.4,
                                       "position_x": 0.9, "position_y": 0.3})
+        if self.frames.of_points:
+            # As large as they are in the middle of the picture.
+            camera = self.plotter.camera
+            distance = np.linalg.norm(np.array(camera.position) - np.array(camera.focal_point))
+            pixel = 2 * distance * np.tan(np.radians(VIEW_ANGLE / 2)) / (self.scale * self.size[1])
+            self.plotter.add_mesh(bodies.fine, scalars="colour", rgb=True, copy_mesh=False,
+                                  style="points", render_points_as_spheres=True,
+                                  point_size=max(2.0, BALL * bodies.spacing / pixel), ambient=0.45,
+                                  diffuse=0.7, specular=0.1, specular_power=24)
+            return
         self.plotter.add_mesh(bodies.fine, scalars="colour", rgb=True, copy_mesh=False,
                               smooth_shading=True, split_sharp_edges=False, ambient=0.56,
                               diffuse=0.62, specular=0.12, specular_power=24)

@@ -4,10 +4,13 @@
 //
 //   Points (moving, m), PointData/velocity (m/s), CellData/object (number of the object a cell is
 //   of); /taut/object_names: the objects' names in that numbering; /taut/object_kind: 0 for bodies,
-//   1 for obstacles, 2 for what is only drawn (results without it have bodies alone).
+//   1 for obstacles, 2 for what is only drawn (results without it have bodies alone). Where points
+//   carry more than that, PointData/NAME and the names in /taut/scalars.
 //
-// Cells are the tets, then the triangles of obstacles. XDMF's form of mixed cells would need a
-// second copy of them: the sidecar shows the tets alone.
+// Cells are the particles (vertices, of the first points), then the tets, then the triangles of
+// obstacles: one type of grid for meshes and material points, so that walls are in the same file.
+// XDMF's form of mixed cells would need a second copy of them: the sidecar shows the particles
+// alone if there are any, else the tets.
 //
 // A run may be killed at any moment, or its disk may fill: every finished frame stays readable. The
 // file has its final layout from the start, laid out for `capacity` frames (unwritten ones are
@@ -34,11 +37,14 @@ enum class ObjectKind : std::uint8_t {
 
 /// What does not change between frames.
 struct ResultMesh {
-  TetMesh mesh;                              ///< points: at t = 0, those of the triangles included
-  std::vector<std::int32_t> object;          ///< per tet, then per triangle: into object_names
+  TetMesh mesh;  ///< points: at t = 0, those of the triangles included
+  /// Per particle, then per tet, then per triangle: into object_names.
+  std::vector<std::int32_t> object;
   std::vector<std::string> object_names;     ///< UTF-8
   std::vector<Triangle> triangles = {};      ///< of obstacles; their vertices are mesh.points
   std::vector<ObjectKind> object_kind = {};  ///< per object; empty: all are bodies
+  std::size_t particles = 0;                 ///< the first of mesh.points, each a cell
+  std::vector<std::string> scalars = {};     ///< names of what else each point has in each frame
 
   ObjectKind kind(std::size_t object_number) const {
     return object_kind.empty() ? ObjectKind::body : object_kind.at(object_number);
@@ -65,10 +71,11 @@ public:
   ResultWriter& operator=(ResultWriter&&) noexcept;
   ~ResultWriter();
 
-  /// Appends the frame at `time` (s): positions (m) and velocities (m/s; empty if the result has
-  /// none), one per point. Throws Error if it cannot be written; the earlier frames are then
-  /// intact.
-  void append(double time, std::span<Point const> positions, std::span<Point const> velocities);
+  /// Appends the frame at `time` (s): positions (m), velocities (m/s; empty if the result has none)
+  /// and a list of numbers for each of its scalars, one per point. Throws Error if it cannot be
+  /// written; the earlier frames are then intact.
+  void append(double time, std::span<Point const> positions, std::span<Point const> velocities,
+              std::span<std::vector<double> const> scalars = {});
 
   std::int64_t frames() const;
 
@@ -95,6 +102,8 @@ public:
   /// One per point; 0 <= frame < frames(). Throws Error otherwise, or if the file cannot be read.
   std::vector<Point> positions(std::int64_t frame) const;   ///< m
   std::vector<Point> velocities(std::int64_t frame) const;  ///< m/s
+  /// Of mesh().scalars. Throws Error for another name, too.
+  std::vector<double> scalar(std::string const& name, std::int64_t frame) const;
 
 private:
   struct File;

@@ -1,4 +1,5 @@
 #include <algorithm>
+#include <array>
 #include <cstring>
 #include <taut/core/io/file.hpp>
 #include <taut/core/io/hdf5.hpp>
@@ -9,7 +10,7 @@ namespace {
 
 using hdf5::Handle;
 
-constexpr std::uint8_t vtk_triangle = 5, vtk_tetra = 10;
+constexpr std::uint8_t vtk_vertex = 1, vtk_triangle = 5, vtk_tetra = 10;
 
 std::vector<Point> read_points(hid_t dataset, std::int64_t first, std::size_t rows) {
   std::vector<Point> points(rows);
@@ -18,23 +19,28 @@ std::vector<Point> read_points(hid_t dataset, std::int64_t first, std::size_t ro
   return points;
 }
 
-/// Throws Error unless `dataset` holds one vector per point and frame.
-void check_shape(hid_t dataset, std::size_t points, std::int64_t frames) {
+/// Throws Error unless `dataset` holds one vector, or one number, per point and frame.
+void check_shape(hid_t dataset, std::size_t points, std::int64_t frames, bool vectors = true) {
   const hdf5::Shape shape = hdf5::shape_of(dataset);
   hdf5::stored_values(dataset, "its point data");
   const std::size_t room = points == 0 ? 0 : shape.at(0) / points;
-  if (shape.size() != 2 || shape[1] != 3 || room < static_cast<std::size_t>(frames)) {
+  const bool right = vectors ? shape.size() == 2 && shape[1] == 3 : shape.size() == 1;
+  if (!right || room < static_cast<std::size_t>(frames)) {
     throw Error("its point data have another size than its steps need");
   }
 }
 
-/// The number of tets; behind them there are triangles.
-std::size_t count_tets(std::vector<std::uint8_t> const& types) {
-  const auto first = std::find(types.begin(), types.end(), vtk_triangle);
-  const bool in_order = std::count(types.begin(), first, vtk_tetra) == first - types.begin() &&
-                        std::count(first, types.end(), vtk_triangle) == types.end() - first;
-  if (!in_order) throw Error("its cells are not tets with triangles behind them");
-  return static_cast<std::size_t>(first - types.begin());
+/// The numbers of particles, of the tets behind them, and of the triangles behind these.
+std::array<std::size_t, 3> count_cells(std::vector<std::uint8_t> const& types) {
+  std::array<std::size_t, 3> counts{};
+  std::size_t sum = 0;
+  for (std::size_t kind = 0; kind < 3; ++kind) {
+    const std::uint8_t type = std::array{vtk_vertex, vtk_tetra, vtk_triangle}[kind];
+    while (sum < types.size() && types[sum] == type) ++sum, ++counts[kind];
+  }
+  if (sum != types.size())
+    throw Error("its cells are not particles, tets and triangles, in this order");
+  return counts;
 }
 
 /// Results of before there were obstacles have no kinds.
@@ -71,18 +77,23 @@ ResultMesh read_mesh(hid_t file) {
     throw Error("its cells are of objects that do not exist");
 
   const auto types = hdf5::read_dataset<std::uint8_t>(file, "VTKHDF/Types");
-  const std::size_t tets = count_tets(types), triangles = types.size() - tets;
+  const auto [particles, tets, triangles] = count_cells(types);
   const auto ids = hdf5::read_dataset<std::int32_t>(file, "VTKHDF/Connectivity");
-  if (!below(ids, result.mesh.points.size()) || ids.size() != 4 * tets + 3 * triangles ||
+  const std::size_t of_tets = particles, of_triangles = particles + 4 * tets;
+  if (!below(ids, result.mesh.points.size()) || ids.size() != of_triangles + 3 * triangles ||
       types.size() != result.object.size()) {
     throw Error("its cells are not those of its points");
   }
+  result.particles = particles;
+  if (H5Lexists(file, "taut/scalars", H5P_DEFAULT) > 0) {
+    result.scalars = hdf5::read_strings(file, "taut/scalars");
+  }
   result.mesh.tets.reserve(tets);
-  for (std::size_t i = 0; i < 4 * tets; i += 4) {
+  for (std::size_t i = of_tets; i < of_triangles; i += 4) {
     result.mesh.tets.push_back({ids[i], ids[i + 1], ids[i + 2], ids[i + 3]});
   }
   result.triangles.reserve(triangles);
-  for (std::size_t i = 4 * tets; i < ids.size(); i += 3) {
+  for (std::size_t i = of_triangles; i < ids.size(); i += 3) {
     result.triangles.push_back({ids[i], ids[i + 1], ids[i + 2]});
   }
   return result;
@@ -110,6 +121,10 @@ struct ResultReader::File {
         velocity_ = hdf5::open_dataset(point_data, "velocity");
         check_shape(velocity_, mesh_.mesh.points.size(), frames);
       }
+      for (std::string const& name : mesh_.scalars) {
+        scalars_.push_back(hdf5::open_dataset(point_data, name));
+        check_shape(scalars_.back(), mesh_.mesh.points.size(), frames, false);
+      }
     } catch (Error const& error) {
       throw Error(
           "{}: this is no result of a run that can be read, because {}; name the .vtkhdf "
@@ -118,20 +133,31 @@ struct ResultReader::File {
     }
   }
 
+  void require(std::int64_t frame) const {
+    if (frame >= 0 && frame < std::ssize(times_)) return;
+    throw Error("{}: there is no frame {}, the result has {} (counted from 0).", path_.string(),
+                frame, times_.size());
+  }
   std::vector<Point> read(hid_t dataset, std::int64_t frame) const {
-    if (frame < 0 || frame >= std::ssize(times_)) {
-      throw Error("{}: there is no frame {}, the result has {} (counted from 0).", path_.string(),
-                  frame, times_.size());
-    }
+    require(frame);
     const hdf5::Quiet quiet;
     const std::size_t n = mesh_.mesh.points.size();
     return read_points(dataset, frame * static_cast<std::int64_t>(n), n);
+  }
+  std::vector<double> read_numbers(hid_t dataset, std::int64_t frame) const {
+    require(frame);
+    const hdf5::Quiet quiet;
+    std::vector<double> numbers(mesh_.mesh.points.size());
+    hdf5::read_rows(dataset, H5T_NATIVE_DOUBLE, static_cast<hsize_t>(frame) * numbers.size(),
+                    numbers.size(), numbers.data(), "a frame cannot be read");
+    return numbers;
   }
 
   std::filesystem::path path_;
   Handle file_;
   Handle points_;
   Handle velocity_;
+  std::vector<Handle> scalars_;  ///< of mesh_.scalars
   ResultMesh mesh_;
   std::vector<double> times_;
   std::int64_t capacity_ = 0;
@@ -163,6 +189,16 @@ std::vector<Point> ResultReader::velocities(std::int64_t frame) const {
     throw Error("{}: this result was written without velocities.", file_->path_.string());
   }
   return file_->read(file_->velocity_, frame);
+}
+
+std::vector<double> ResultReader::scalar(std::string const& name, std::int64_t frame) const {
+  std::vector<std::string> const& names = file_->mesh_.scalars;
+  const auto found = std::find(names.begin(), names.end(), name);
+  if (found == names.end()) {
+    throw Error("{}: this result was written without \"{}\".", file_->path_.string(), name);
+  }
+  return file_->read_numbers(file_->scalars_[static_cast<std::size_t>(found - names.begin())],
+                             frame);
 }
 
 }  // namespace taut

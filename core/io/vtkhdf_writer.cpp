@@ -29,7 +29,7 @@ using hdf5::Handle;
 using hdf5::Shape;
 
 constexpr std::array tables{"/taut/steps_a", "/taut/steps_b"};
-constexpr std::uint8_t vtk_triangle = 5, vtk_tetra = 10;
+constexpr std::uint8_t vtk_vertex = 1, vtk_triangle = 5, vtk_tetra = 10;
 
 template <class T, class Container>
 void write_list(hid_t parent, std::string const& name, Container const& values) {
@@ -40,11 +40,12 @@ void write_count(hid_t parent, std::string const& name, std::size_t count) {
   write_list<std::int64_t>(parent, name, std::array{static_cast<std::int64_t>(count)});
 }
 
-/// Room for one vector per point and frame; unwritten rows take no disk space.
+/// Room for one vector, or one number, per point and frame; unwritten rows take no disk space.
 void reserve_frames(hid_t parent, std::string const& name, std::size_t points,
-                    std::int64_t capacity) {
-  hdf5::make_dataset(parent, name, H5T_NATIVE_DOUBLE, {static_cast<hsize_t>(capacity) * points, 3},
-                     true);
+                    std::int64_t capacity, bool vectors = true) {
+  Shape shape{static_cast<hsize_t>(capacity) * points};
+  if (vectors) shape.push_back(3);
+  hdf5::make_dataset(parent, name, H5T_NATIVE_DOUBLE, shape, true);
 }
 
 /// The times of the steps: as long as there are steps, at least 1, in one chunk that never moves.
@@ -62,7 +63,8 @@ void make_times(hid_t table, std::int64_t capacity) {
 
 /// The two step tables without steps. They share what depends on the step's number alone: the
 /// points of step k begin at row k N, its cells are always the first.
-void make_tables(hid_t file, std::size_t points, std::int64_t capacity, bool velocities) {
+void make_tables(hid_t file, ResultMesh const& mesh, std::int64_t capacity, bool velocities) {
+  const std::size_t points = mesh.mesh.points.size();
   const auto n = static_cast<std::size_t>(capacity);
   const std::vector<std::int64_t> zeros(n, 0);
   std::vector<std::int64_t> rows(n);
@@ -77,6 +79,7 @@ void make_tables(hid_t file, std::size_t points, std::int64_t capacity, bool vel
   }
   const Handle point_data = hdf5::make_group(first, "PointDataOffsets");
   if (velocities) write_list<std::int64_t>(point_data, "velocity", rows);
+  for (std::string const& name : mesh.scalars) write_list<std::int64_t>(point_data, name, rows);
   const Handle cell_data = hdf5::make_group(first, "CellDataOffsets");
   write_list<std::int64_t>(cell_data, "object", zeros);
 
@@ -93,21 +96,26 @@ void make_tables(hid_t file, std::size_t points, std::int64_t capacity, bool vel
 }
 
 void write_cells(hid_t grid, ResultMesh const& mesh) {
-  const std::size_t tets = mesh.mesh.tets.size(), cells = tets + mesh.triangles.size();
+  const std::size_t solids = mesh.particles + mesh.mesh.tets.size(),
+                    cells = solids + mesh.triangles.size();
   std::vector<std::int64_t> ids, offsets{0};
-  ids.reserve(4 * tets + 3 * mesh.triangles.size());
+  ids.reserve(mesh.particles + 4 * mesh.mesh.tets.size() + 3 * mesh.triangles.size());
   offsets.reserve(cells + 1);
   const auto add = [&](auto const& cell) {
     ids.insert(ids.end(), cell.begin(), cell.end());
     offsets.push_back(static_cast<std::int64_t>(ids.size()));
   };
+  for (std::size_t p = 0; p < mesh.particles; ++p) {
+    add(std::array{static_cast<std::int64_t>(p)});
+  }
   for (Tet const& tet : mesh.mesh.tets) add(tet);
   for (Triangle const& triangle : mesh.triangles) add(triangle);
   write_count(grid, "NumberOfCells", cells);
   write_count(grid, "NumberOfConnectivityIds", ids.size());
   write_list<std::int64_t>(grid, "Connectivity", ids);
   write_list<std::int64_t>(grid, "Offsets", offsets);
-  std::vector<std::uint8_t> types(tets, vtk_tetra);
+  std::vector<std::uint8_t> types(mesh.particles, vtk_vertex);
+  types.resize(solids, vtk_tetra);
   types.resize(cells, vtk_triangle);
   write_list<std::uint8_t>(grid, "Types", types);
 }
@@ -148,21 +156,26 @@ void lay_out(fs::path const& path, ResultMesh const& mesh, std::int64_t capacity
     const Handle start = hdf5::make_dataset(ours, "points", H5T_NATIVE_DOUBLE, {points, 3});
     hdf5::write_rows(start, H5T_NATIVE_DOUBLE, 0, points, mesh.mesh.points.data(), "points");
   }
-  make_tables(file, points, capacity, velocities);
+  if (!mesh.scalars.empty()) hdf5::write_strings(ours, "scalars", mesh.scalars);
+  make_tables(file, mesh, capacity, velocities);
   hdf5::check(H5Lcreate_soft(tables[0], grid, "Steps", H5P_DEFAULT, H5P_DEFAULT), "Steps");
 
   reserve_frames(grid, "Points", points, capacity);
   const Handle point_data = hdf5::make_group(grid, "PointData");
   if (velocities) reserve_frames(point_data, "velocity", points, capacity);
+  for (std::string const& name : mesh.scalars) {
+    reserve_frames(point_data, name, points, capacity, false);
+  }
   hdf5::check(H5Fflush(file, H5F_SCOPE_LOCAL), "the layout cannot be written");
 }
 
 /// Throws Error when the disk cannot hold what lay_out() writes at once. HDF5 cannot close a file
 /// after its disk ran full, so this is found out before.
 void check_free_space(fs::path const& path, ResultMesh const& mesh, std::int64_t capacity) {
-  const std::uintmax_t bytes = (1 << 16) + sizeof(Point) * mesh.mesh.points.size() +
-                               64 * (mesh.mesh.tets.size() + mesh.triangles.size()) +
-                               64 * static_cast<std::uintmax_t>(capacity);
+  const std::uintmax_t bytes =
+      (1 << 16) + sizeof(Point) * mesh.mesh.points.size() +
+      64 * (mesh.particles + mesh.mesh.tets.size() + mesh.triangles.size()) +
+      64 * static_cast<std::uintmax_t>(capacity);
   std::error_code unknown;
   const fs::path folder = path.has_parent_path() ? path.parent_path() : fs::path(".");
   const fs::space_info space = fs::space(folder, unknown);
@@ -207,8 +220,13 @@ struct ResultWriter::File {
       // Closed before the file is opened for writing: HDF5 refuses both in one process.
       ResultReader const reader(path_);
       ResultMesh const& all = reader.mesh();
-      shape_ = {all.mesh.points.size(), all.mesh.tets.size(), all.triangles.size(),
-                reader.capacity(), reader.has_velocities()};
+      shape_ = {all.mesh.points.size(),
+                all.particles,
+                all.mesh.tets.size(),
+                all.triangles.size(),
+                reader.capacity(),
+                reader.has_velocities(),
+                all.scalars};
       times_ = reader.times();
     }
     const hdf5::Quiet quiet;
@@ -216,6 +234,10 @@ struct ResultWriter::File {
     grid_ = hdf5::open_group(file_, "VTKHDF");
     points_ = hdf5::open_dataset(grid_, "Points");
     if (shape_.velocities) velocity_ = hdf5::open_dataset(grid_, "PointData/velocity");
+    scalars_.clear();
+    for (std::string const& name : shape_.scalars) {
+      scalars_.push_back(hdf5::open_dataset(grid_, "PointData/" + name));
+    }
     std::array<char, 16> target{};
     hdf5::check(H5Lget_val(grid_, "Steps", target.data(), target.size(), H5P_DEFAULT), "Steps");
     in_use_ = std::string_view(target.data()) == tables[1] ? 1 : 0;
@@ -242,14 +264,18 @@ struct ResultWriter::File {
     in_use_ = next;
   }
 
-  void write_frame(double time, std::span<Point const> positions,
-                   std::span<Point const> velocities) {
+  void write_frame(double time, std::span<Point const> positions, std::span<Point const> velocities,
+                   std::span<std::vector<double> const> scalars) {
     const hsize_t row = times_.size() * shape_.points;
     hdf5::write_rows(points_, H5T_NATIVE_DOUBLE, row, shape_.points, positions.data(),
                      "the positions cannot be written");
     if (shape_.velocities) {
       hdf5::write_rows(velocity_, H5T_NATIVE_DOUBLE, row, shape_.points, velocities.data(),
                        "the velocities cannot be written");
+    }
+    for (std::size_t k = 0; k < scalars_.size(); ++k) {
+      hdf5::write_rows(scalars_[k], H5T_NATIVE_DOUBLE, row, shape_.points, scalars[k].data(),
+                       "the numbers of a frame cannot be written");
     }
     times_.push_back(time);
     commit();
@@ -264,10 +290,13 @@ struct ResultWriter::File {
       for (std::int64_t k = 0; k < std::ssize(times_); ++k) {
         const std::vector<Point> velocities =
             shape_.velocities ? reader.velocities(k) : std::vector<Point>{};
+        std::vector<std::vector<double>> scalars;
+        for (std::string const& name : shape_.scalars) scalars.push_back(reader.scalar(name, k));
         copy.write_frame(reader.times()[static_cast<std::size_t>(k)], reader.positions(k),
-                         velocities);
+                         velocities, scalars);
       }
     });
+    scalars_.clear();
     for (Handle* const handle : {&velocity_, &points_, &grid_, &file_}) handle->reset();
     open();
   }
@@ -279,6 +308,7 @@ struct ResultWriter::File {
   Handle grid_;
   Handle points_;
   Handle velocity_;
+  std::vector<Handle> scalars_;
   std::size_t in_use_ = 0;  // which of `tables` /VTKHDF/Steps leads to
   XdmfSidecar sidecar_;
 };
@@ -298,9 +328,15 @@ ResultWriter ResultWriter::create(fs::path const& path, ResultMesh const& mesh,
         "--force to replace it.",
         path.string());
   }
-  if (mesh.object.size() != mesh.mesh.tets.size() + mesh.triangles.size()) {
-    throw Error("{}: {} tets and {} triangles have {} object numbers; give one for each.",
-                path.string(), mesh.mesh.tets.size(), mesh.triangles.size(), mesh.object.size());
+  if (mesh.object.size() != mesh.particles + mesh.mesh.tets.size() + mesh.triangles.size()) {
+    throw Error(
+        "{}: {} particles, {} tets and {} triangles have {} object numbers; give one for each.",
+        path.string(), mesh.particles, mesh.mesh.tets.size(), mesh.triangles.size(),
+        mesh.object.size());
+  }
+  if (mesh.particles > mesh.mesh.points.size()) {
+    throw Error("{}: {} particles are more than the {} points.", path.string(), mesh.particles,
+                mesh.mesh.points.size());
   }
   if (!mesh.object_kind.empty() && mesh.object_kind.size() != mesh.object_names.size()) {
     throw Error("{}: {} objects have {} kinds; give one for each, or none.", path.string(),
@@ -325,6 +361,7 @@ ResultWriter ResultWriter::resume(fs::path const& path, ResultMesh const& mesh, 
     ResultMesh const& old = reader.mesh();
     if (old.mesh.points.size() != mesh.mesh.points.size() || old.mesh.tets != mesh.mesh.tets ||
         old.triangles != mesh.triangles || old.object != mesh.object ||
+        old.particles != mesh.particles || old.scalars != mesh.scalars ||
         old.object_names != mesh.object_names || old.object_kind != kinds_of(mesh)) {
       throw Error(
           "{}: this result is of another mesh or other objects; restart with the scene it "
@@ -356,7 +393,8 @@ ResultWriter ResultWriter::resume(fs::path const& path, ResultMesh const& mesh, 
 }
 
 void ResultWriter::append(double time, std::span<Point const> positions,
-                          std::span<Point const> velocities) {
+                          std::span<Point const> velocities,
+                          std::span<std::vector<double> const> scalars) {
   ResultShape const& shape = file_->shape_;
   const std::size_t expected = shape.velocities ? shape.points : 0;
   if (positions.size() != shape.points || velocities.size() != expected) {
@@ -365,12 +403,18 @@ void ResultWriter::append(double time, std::span<Point const> positions,
         "{}.",
         file_->path_.string(), positions.size(), velocities.size(), shape.points, expected);
   }
+  bool fits = scalars.size() == shape.scalars.size();
+  for (std::vector<double> const& list : scalars) fits = fits && list.size() == shape.points;
+  if (!fits) {
+    throw Error("{}: a frame with {} lists of numbers does not fit this result of {}, of {} each.",
+                file_->path_.string(), scalars.size(), shape.scalars.size(), shape.points);
+  }
   const bool grows = frames() == shape.capacity;
   name_errors(file_->path_, fmt::format("frame {} cannot be written", frames()), [&] {
     if (grows) file_->grow(2 * shape.capacity);
     const std::size_t before = file_->times_.size();
     try {
-      file_->write_frame(time, positions, velocities);
+      file_->write_frame(time, positions, velocities, scalars);
     } catch (Error const&) {
       file_->times_.resize(before);
       throw;

@@ -65,6 +65,15 @@ std::string XdmfSidecar::grid(std::int64_t frame, double time) const {
         shape_.points, static_cast<std::size_t>(frame) * shape_.points, capacity * shape_.points,
         result_, dataset, frame);
   };
+  const auto numbers_of = [&](std::string_view dataset) {
+    return fmt::format(
+        "<DataItem ItemType=\"HyperSlab\" Dimensions=\"{0}\"><!--frame {5}-->"
+        "<DataItem Dimensions=\"3 1\" NumberType=\"Int\" Format=\"XML\">{1} 1 {0}</DataItem>"
+        "<DataItem Dimensions=\"{2}\" NumberType=\"Float\" Precision=\"8\" Format=\"HDF\">"
+        "{3}:/VTKHDF/{4}</DataItem></DataItem>",
+        shape_.points, static_cast<std::size_t>(frame) * shape_.points, capacity * shape_.points,
+        result_, dataset, frame);
+  };
   // The first `count` of `all` whole numbers.
   const auto first = [&](std::string_view dataset, std::size_t count, std::size_t all, int bytes) {
     const std::string numbers = fmt::format(
@@ -78,18 +87,27 @@ std::string XdmfSidecar::grid(std::int64_t frame, double time) const {
         "{1}</DataItem>",
         count, numbers);
   };
+  const bool points = shape_.particles > 0;
+  const std::size_t shown = points ? shape_.particles : shape_.tets;
   std::string xml = fmt::format(
       "<Grid Name=\"frame {0}\"><Time Value=\"{1}\"/>\n"
-      "<Topology TopologyType=\"Tetrahedron\" NumberOfElements=\"{2}\">{3}</Topology>\n"
-      "<Geometry GeometryType=\"XYZ\">{4}</Geometry>\n"
-      "<Attribute Name=\"object\" Center=\"Cell\">{5}</Attribute>\n",
-      frame, time, shape_.tets,
-      first("Connectivity", 4 * shape_.tets, 4 * shape_.tets + 3 * shape_.triangles, 8),
-      rows("Points"), first("CellData/object", shape_.tets, shape_.tets + shape_.triangles, 4));
+      "<Topology TopologyType=\"{2}\" NumberOfElements=\"{3}\"{4}>{5}</Topology>\n"
+      "<Geometry GeometryType=\"XYZ\">{6}</Geometry>\n"
+      "<Attribute Name=\"object\" Center=\"Cell\">{7}</Attribute>\n",
+      frame, time, points ? "Polyvertex" : "Tetrahedron", shown,
+      points ? " NodesPerElement=\"1\"" : "",
+      first("Connectivity", points ? shown : 4 * shown,
+            shape_.particles + 4 * shape_.tets + 3 * shape_.triangles, 8),
+      rows("Points"),
+      first("CellData/object", shown, shape_.particles + shape_.tets + shape_.triangles, 4));
   if (shape_.velocities) {
     xml += fmt::format(
         "<Attribute Name=\"velocity\" AttributeType=\"Vector\" Center=\"Node\">{}</Attribute>\n",
         rows("PointData/velocity"));
+  }
+  for (std::string const& name : shape_.scalars) {
+    xml += fmt::format("<Attribute Name=\"{0}\" Center=\"Node\">{1}</Attribute>\n", name,
+                       numbers_of("PointData/" + name));
   }
   return xml + "</Grid>\n";
 }

@@ -7,16 +7,19 @@
 #include <filesystem>
 #include <span>
 #include <string>
+#include <vector>
 
 namespace taut {
 
 /// The sizes of the datasets that an XdmfSidecar points into.
 struct ResultShape {
   std::size_t points = 0;
+  std::size_t particles = 0;  ///< in front of the tets
   std::size_t tets = 0;
   std::size_t triangles = 0;  ///< behind the tets; not shown
   std::int64_t capacity = 0;  ///< frames the datasets have room for
   bool velocities = true;
+  std::vector<std::string> scalars = {};  ///< names of the numbers that points have
 };
 
 class XdmfSidecar {

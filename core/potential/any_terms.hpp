@@ -27,12 +27,15 @@ public:
   using Fixed = FixedMask<Space>;
   using Indices = typename Bodies<Space>::Indices;
 
+  /// Returns the term as the list, and every copy of it, holds it: for who has to tell it things.
   template <SweptTerm Term>
-  void add(Term term) {
+  std::shared_ptr<Term> add(Term term) {
     static_assert(SteppedTerm<Term> == stepped,
                   "taut: a term with begin_step belongs into AnySteppedTerms, any other into "
                   "AnyTerms");
-    terms_.push_back(std::make_shared<Holder<Term> const>(std::move(term)));
+    auto const held = std::make_shared<Holder<Term>>(std::move(term));
+    terms_.push_back(held);
+    return {held, &held->term};
   }
 
   double value(Positions const& x, double scale) const {

@@ -475,6 +475,31 @@ public:
     return true;
   }
 
+  /// The Hessian at x in two parts: that of a term which couples unknowns as an operator of its own
+  /// kind, and blocks of what acts on single unknowns (the mass, where these are fixed).
+  template <class Operator>
+  void linearise(Positions const& x, Operator& to, Blocks const& local) {
+    local_gradient<6>(x, direction_, local);
+    for_each_swept([&](auto const& term) {
+      using Term = std::decay_t<decltype(term)>;
+      if constexpr (requires { term.linearise(x, scale_, to); }) {
+        term.linearise(x, scale_, to);
+      } else {
+        static_assert(UncoupledTerm<Term>,
+                      "taut: a term that couples unknowns has no part in this operator; take a "
+                      "preconditioner that assembles the Hessian");
+        term.add_gradient(x, scale_, unknowns_.fixed, direction_, local);
+      }
+    });
+  }
+
+  /// What residuals of unknowns are measured by, N: the sum over the terms that can tell.
+  void characteristic_force(Array<double, Space> const& force) const
+      requires(CharacteristicTerm<Terms> || ...) {
+    Kokkos::deep_copy(Space::instance(), force, 0.0);
+    for_each_of<is_characteristic>([&](auto const& term) { term.add_characteristic_force(force); });
+  }
+
   // For minimisers that go by bodies and islands (DivisibleObjective).
   bool divisible() const {
     bool all = true;
@@ -575,6 +600,8 @@ private:
   using is_lagged = std::bool_constant<LaggedTerm<Term>>;
   template <class Term>
   using is_moving = std::bool_constant<MovingTerm<Term>>;
+  template <class Term>
+  using is_characteristic = std::bool_constant<CharacteristicTerm<Term>>;
   template <class Term>
   using is_divisible = std::bool_constant<DivisibleTerm<Term>>;
   template <class Term>

@@ -156,6 +156,19 @@ concept CertifyingTerm = SweptTerm<Term> &&
   { term.max_step(x, p, at_most, certified) } -> std::convertible_to<double>;
 };
 
+/// A term that can say what force, N, a deformation of the size of an element meets at each
+/// unknown: what residuals are measured by (Zhu et al. 2018; Wang et al. 2020, section 6). Adds it.
+template <class Term>
+concept CharacteristicTerm = SweptTerm<Term> &&
+    requires(Term const& term, Array<double, typename Term::Space> const& force) {
+  {term.add_characteristic_force(force)};
+};
+
+/// A swept term that does not couple unknowns either: its Hessian is what `add_gradient` adds to
+/// blocks.
+template <class Term>
+concept UncoupledTerm = SweptTerm<Term> && !Term::couples;
+
 /// Marks of unknowns that a minimiser has left where they are for now (not 0), or nothing.
 template <class S>
 using IdleMask = Kokkos::View<std::uint8_t*, typename S::memory>;

@@ -51,31 +51,17 @@ struct PackedTriangle {
   }
 };
 
-template <class S, class Storage>
-struct FactorAggregate {
+/// The lower triangle of the block of an aggregate in a matrix; rows beyond the last unknown are
+/// those of the identity.
+template <class S>
+struct LoadAggregate {
   using Triangle = PackedTriangle;
-  /// Below this fraction of the diagonal a pivot is noise: the block is not positive definite. Its
-  /// row is then cut off from the rows before it and left to its own diagonal, as point Jacobi
-  /// would; with the coupling kept, G could grow without bound.
-  static constexpr double least_pivot = 1e-12;
-
   BlockCsr<S, double> a;
-  Kokkos::View<Storage*, typename S::memory> factor;
-  int run, scratch_level;
+  int run;
 
-  KOKKOS_FUNCTION std::size_t scratch_size() const {
-    return sizeof(double) * std::size_t(Triangle::row(3 * run) + 3 * run);
-  }
-
-  /// Copies the lower triangle of the aggregate's block; rows beyond the last unknown are those of
-  /// the identity.
-  KOKKOS_FUNCTION void load(typename S::team_member const& team, double* g) const {
+  KOKKOS_FUNCTION void operator()(typename S::team_member const& team, double* g) const {
     int const first = run * team.league_rank();
     int const last = Kokkos::min(first + run, a.rows());
-    int const rows = 3 * run;
-    Kokkos::parallel_for(Kokkos::TeamThreadRange(team, Triangle::row(rows)),
-                         [&](int t) { g[t] = 0; });
-    team.team_barrier();
     Kokkos::parallel_for(Kokkos::TeamThreadRange(team, run), [&](int v) {
       if (first + v >= last) {
         for (int i = 3 * v; i < 3 * v + 3; ++i) g[Triangle::row(i) + i] = 1;
@@ -89,7 +75,24 @@ struct FactorAggregate {
             g[Triangle::row(3 * v + r) + 3 * w + c] = a.block(k)(r, c);
       }
     });
-    team.team_barrier();
+  }
+};
+
+/// `Load` writes the lower triangle of an aggregate into zeros.
+template <class S, class Storage, class Load>
+struct FactorAggregate {
+  using Triangle = PackedTriangle;
+  /// Below this fraction of the diagonal a pivot is noise: the block is not positive definite. Its
+  /// row is then cut off from the rows before it and left to its own diagonal, as point Jacobi
+  /// would; with the coupling kept, G could grow without bound.
+  static constexpr double least_pivot = 1e-12;
+
+  Load load;
+  Kokkos::View<Storage*, typename S::memory> factor;
+  int run, scratch_level;
+
+  KOKKOS_FUNCTION std::size_t scratch_size() const {
+    return sizeof(double) * std::size_t(Triangle::row(3 * run) + 3 * run);
   }
 
   KOKKOS_FUNCTION void operator()(typename S::team_member const& team, int& floored) const {
@@ -97,7 +100,11 @@ struct FactorAggregate {
     double* const g =
         static_cast<double*>(team.team_scratch(scratch_level).get_shmem(int(scratch_size())));
     double* const l = g + Triangle::row(rows);
+    Kokkos::parallel_for(Kokkos::TeamThreadRange(team, Triangle::row(rows)),
+                         [&](int t) { g[t] = 0; });
+    team.team_barrier();
     load(team, g);
+    team.team_barrier();
 
     for (int i = 0; i < rows; ++i) {
       double* const row = g + Triangle::row(i);
@@ -190,7 +197,13 @@ public:
   /// Inverts the diagonal blocks of A, of which the lower triangle is read; returns how many pivots
   /// were not positive and were replaced.
   int factorize(BlockCsr<S, double> const& a) {
-    kernels::FactorAggregate<S, Storage> kernel{a, factor_, run_, 0};
+    return factorize_loaded(kernels::LoadAggregate<S>{a, run_});
+  }
+  /// The same of blocks that `load(team, g)` writes: the lower triangle of that of
+  /// team.league_rank(), as a PackedTriangle.
+  template <class Load>
+  int factorize_loaded(Load const& load) {
+    kernels::FactorAggregate<S, Storage, Load> kernel{load, factor_, run_, 0};
     using Policy = typename S::team_policy;
     int const bytes = static_cast<int>(kernel.scratch_size());
     kernel.scratch_level = bytes <= Policy::scratch_size_max(0) ? 0 : 1;

@@ -1,21 +1,16 @@
 // One step of a block of 4^3 cells against numbers that were computed independently: energy,
 // residual and Hessian where it begins, and the minimum where it ends.
-#include <taut/core/potential/potential.hpp>
 #include <taut/integrators/direct.hpp>
 #include <taut/integrators/newton.hpp>
-#include <taut/integrators/time_stepper.hpp>
-#include <taut/materials/models.hpp>
-#include <taut/mpm/elastic_particles.hpp>
-#include <taut/mpm/particle_stepper.hpp>
 
 #include <catch2/catch_test_macros.hpp>
 #include <catch2/matchers/catch_matchers_floating_point.hpp>
-#include <support/data.hpp>
 
 #include <algorithm>
 #include <cmath>
-#include <numbers>
 #include <numeric>
+
+#include "golden_block.hpp"
 
 namespace taut {
 namespace {
@@ -27,41 +22,6 @@ using P = Fp64;
 using Solid = ElasticParticles<Elastic<FixedCorotated, FullProjection>, QuadraticSpline, P>;
 using Exact = Newton<Direct, Identity, SufficientDecrease, DecrementWindow, P>;
 
-double fraction(double x) { return x - std::floor(x); }
-
-std::vector<Particle> block(std::string const& which) {
-  double const dx = 0.1;
-  std::vector<Particle> list;
-  for (int i = 0; i < 8; ++i)
-    for (int j = 0; j < 8; ++j)
-      for (int k = 0; k < 8; ++k) {
-        Particle p;
-        p.x = {0.8 + dx * (0.25 + 0.5 * i), 0.8 + dx * (0.25 + 0.5 * j),
-               0.8 + dx * (0.25 + 0.5 * k)};
-        p.volume = dx * dx * dx / 8;
-        p.mass = 1000 * p.volume;
-        list.push_back(p);
-      }
-  if (which == "stretch") {
-    double const c[3] = {0.6180339887498949, 0.4142135623730951, 0.7320508075688772};
-    for (std::size_t p = 0; p < list.size(); ++p)
-      for (int a = 0; a < 3; ++a) {
-        list[p].F(a, a) = 0.7 + 0.6 * fraction(static_cast<double>(p + 1) * c[a]);
-      }
-    return list;
-  }
-  for (Particle& p : list) {
-    double const two_pi = 2 * std::numbers::pi, x = p.x[0] - 1, y = p.x[1] - 1, z = p.x[2] - 1;
-    p.v = {two_pi * y * z, 0, -two_pi * y * x};
-    p.C(0, 1) = two_pi * z;
-    p.C(0, 2) = two_pi * y;
-    p.C(2, 0) = -two_pi * y;
-    p.C(2, 1) = -two_pi * x;
-    if (which == "hetero" && p.x[0] >= 1) p.material = 1;
-  }
-  return list;
-}
-
 TEST_CASE("one step of a block agrees with the reference", "[mpm][stepper]") {
   auto const all = nlohmann::json::parse(std::ifstream(test::data_file("vectors/hot_vectors.json")))
                        .at("one_step_goldens");
@@ -71,7 +31,7 @@ TEST_CASE("one step of a block agrees with the reference", "[mpm][stepper]") {
     double const dx = golden.at("dx"), h = golden.at("dt");
     Vec3<double> const gravity{golden.at("gravity")[0], golden.at("gravity")[1],
                                golden.at("gravity")[2]};
-    Particles<P, S> const particles(block(which));
+    Particles<P, S> const particles(test::golden_block(which));
     ParticleGrid<QuadraticSpline, P> grid(dx, Solid::lanes);
     Potential scene(grid.unknowns(), Inertia<P>(grid.unknowns()),
                     BodyForce<P>(grid.unknowns(), gravity),

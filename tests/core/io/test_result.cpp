@@ -417,3 +417,52 @@ TEST_CASE("what is no result, or not this one, is refused with a sentence") {
              }),
              {"folder", path.string()});
 }
+
+TEST_CASE("a result of particles carries numbers, and triangles behind them", "[io][result]") {
+  const Folder folder;
+  const auto path = folder / "result.vtkhdf";
+  ResultMesh mesh{{two_tets().points, {}},
+                  {0, 0, 1, 2},
+                  {"sand", "stone", "wall"},
+                  {{0, 1, 2}},
+                  {ObjectKind::body, ObjectKind::body, ObjectKind::drawn_only},
+                  3,
+                  {"J", "plastic"}};
+  const std::size_t n = mesh.mesh.points.size();
+  const auto numbers = [&](int k) {
+    std::vector<std::vector<double>> lists(2, std::vector<double>(n));
+    for (std::size_t p = 0; p < n; ++p)
+      lists[0][p] = k + 0.1 * double(p), lists[1][p] = -k - double(p);
+    return lists;
+  };
+  {
+    auto writer = ResultWriter::create(path, mesh, 2, ResultWriter::IfExists::refuse);
+    for (int k = 0; k < 3; ++k) writer.append(k / 60.0, frame(k, 1), frame(k, -1), numbers(k));
+    CHECK_THROWS_AS(writer.append(1, frame(3, 1), frame(3, -1)), Error);
+  }
+  {
+    auto writer = ResultWriter::resume(path, mesh, 2, 9);  // grows
+    writer.append(7 / 60.0, frame(7, 1), frame(7, -1), numbers(7));
+    mesh.scalars.pop_back();
+    CHECK_THROWS_AS(ResultWriter::resume(path, mesh, 2, 9), Error);
+    mesh.scalars.push_back("plastic");
+  }
+  const ResultReader reader(path);
+  check_same(reader.mesh(), mesh);
+  CHECK(reader.mesh().particles == 3);
+  CHECK(reader.mesh().scalars == mesh.scalars);
+  REQUIRE(reader.frames() == 3);
+  const int kept[] = {0, 1, 7};
+  for (int k = 0; k < 3; ++k) {
+    CHECK(reader.positions(k) == frame(kept[k], 1));
+    CHECK(reader.scalar("J", k) == numbers(kept[k])[0]);
+    CHECK(reader.scalar("plastic", k) == numbers(kept[k])[1]);
+  }
+  CHECK_THROWS_AS(reader.scalar("mass", 0), Error);
+  CHECK(read_file(folder / "result.xdmf").find("Polyvertex") != std::string::npos);
+  mesh.particles = n + 1;
+  mesh.object.assign(n + 2, 0);
+  CHECK_THROWS_AS(
+      ResultWriter::create(folder / "other.vtkhdf", mesh, 2, ResultWriter::IfExists::refuse),
+      Error);
+}

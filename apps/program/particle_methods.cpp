@@ -1,0 +1,263 @@
+#include <taut/apps/program/option_policies.hpp>
+#include <taut/apps/program/particle_methods.hpp>
+#include <taut/core/report/error.hpp>
+#include <taut/integrators/any_preconditioner.hpp>
+#include <taut/integrators/inverse_by_pcg.hpp>
+#include <taut/integrators/lbfgs.hpp>
+#include <taut/integrators/ncg.hpp>
+#include <taut/mpm/particle_hessian.hpp>
+#include <taut/mpm/particle_multigrid.hpp>
+
+#include <array>
+#include <variant>
+
+namespace taut {
+namespace {
+
+using P = ParticlePrecision;
+using S = DefaultSpace;
+
+/// As Wang et al. 2020 have it: fine matrix, symmetric Gauss-Seidel, all in fp64.
+template <class Embedding>
+using HotPolicies =
+    ParticleCyclePolicies<true, SymmetricGaussSeidel, SymmetricGaussSeidel, Embedding, double>;
+using Cycle = ParticleMultigrid<P, S>;
+using HotCycle = ParticleMultigrid<P, S, HotPolicies<LinearEmbedding>>;
+using HotQuadraticCycle = ParticleMultigrid<P, S, HotPolicies<QuadraticEmbedding>>;
+template <class Precision, class Space>
+using MatrixOfParticles = ParticleHessian<Precision, Space, true>;
+template <class Precision, class Space>
+using NumbersOfParticles = ParticleHessian<Precision, Space, false>;
+using HessianByPcg = InverseByPcg<P, S, MatrixOfParticles<P, S>>;
+
+/// Chosen at run time, so that each minimiser is compiled once.
+template <class Precision, class Space>
+class GridPreconditioner
+    : public OneOfPreconditioners<Precision, Space, Cycle, HotCycle, HotQuadraticCycle,
+                                  HessianByPcg, BlockJacobi<Precision, Space>,
+                                  Jacobi<Precision, Space>, Identity<Precision, Space>> {
+public:
+  using GridPreconditioner::OneOfPreconditioners::OneOfPreconditioners;
+};
+
+/// Those of meshes, and HOT's.
+class ParticleStopping {
+public:
+  using Params = std::variant<AnyStopping::Params, CharacteristicNorm<S>::Params>;
+
+  ParticleStopping() = default;
+  explicit ParticleStopping(Params const& params) {
+    if (auto const* norm = std::get_if<CharacteristicNorm<S>::Params>(&params)) {
+      rule_ = CharacteristicNorm<S>(*norm);
+    } else {
+      rule_ = AnyStopping(std::get<AnyStopping::Params>(params));
+    }
+  }
+  void start(Scale const& scale) {
+    std::visit([&](auto& rule) { rule.start(scale); }, rule_);
+  }
+  Stop check(Progress const& progress) {
+    return std::visit([&](auto& rule) { return rule.check(progress); }, rule_);
+  }
+  Stop judge(ParticlePotential& e, VectorField<P::real, S> const& g) {
+    auto* const norm = std::get_if<CharacteristicNorm<S>>(&rule_);
+    return norm != nullptr ? norm->judge(e, g) : Stop::none;
+  }
+  void forget() {
+    std::visit([](auto& rule) { rule.forget(); }, rule_);
+  }
+  double error_estimate() const {
+    return std::visit([](auto const& rule) { return rule.error_estimate(); }, rule_);
+  }
+  double negligible() const {
+    return std::visit([](auto const& rule) { return rule.negligible(); }, rule_);
+  }
+
+private:
+  std::variant<AnyStopping, CharacteristicNorm<S>> rule_;
+};
+
+class AnyForcing {
+public:
+  using Params = std::variant<ForcingTerm::Params, RootForcing::Params>;
+  explicit AnyForcing(Params const& params)
+      : rule_(std::holds_alternative<RootForcing::Params>(params)
+                  ? Rule(RootForcing(std::get<RootForcing::Params>(params)))
+                  : Rule(ForcingTerm(std::get<ForcingTerm::Params>(params)))) {}
+  void start(ParticlePotential& e) {
+    std::visit([&](auto& rule) { rule.start(e); }, rule_);
+  }
+  void restart() {
+    std::visit([](auto& rule) { rule.restart(); }, rule_);
+  }
+  LinearTolerance operator()(double norm) {
+    return std::visit([&](auto& rule) { return rule(norm); }, rule_);
+  }
+
+private:
+  using Rule = std::variant<ForcingTerm, RootForcing>;
+  Rule rule_;
+};
+
+template <class Minimiser>
+struct Holder final : ParticleMinimiser::Interface {
+  Minimiser minimiser;
+  explicit Holder(typename Minimiser::Params const& params) : minimiser(params) {}
+  NewtonReport minimise(ParticlePotential& potential, ParticleMinimiser::Positions const& x,
+                        Observer<P, S> const& observer) override {
+    return NewtonReport{minimiser.minimise(potential, x, observer)};
+  }
+};
+
+class Builder {
+public:
+  using Made = std::unique_ptr<ParticleMinimiser::Interface>;
+
+  explicit Builder(SolverOptions const& options)
+      : options_(options), method_(options.text("method")) {}
+
+  Made make() const {
+    if (method_ == "newton" || method_.starts_with("pn_")) return newton();
+    bool const hot = method_.starts_with("hot") || method_ == "lbfgs_h";
+    if (method_ == "lbfgs" || hot) {
+      using Minimiser = Lbfgs<GridPreconditioner, AnyLineSearch, ParticleStopping, P, S>;
+      Minimiser::Params params;
+      params.lbfgs.window = options_.integer("history");
+      // A cycle is close to the inverse, in size too.
+      params.lbfgs.newton_step = !hot && !multigrid();
+      params.lbfgs.newton_first_step = !hot;
+      return hold<Minimiser>(params, window());
+    }
+    if (method_ == "chebyshev") {
+      throw Error(
+          "solver.method = \"chebyshev\" is compiled for meshes alone: choose lbfgs, newton or a "
+          "nonlinear CG");
+    }
+    using Minimiser = Ncg<AnyBeta, GridPreconditioner, AnyLineSearch, ParticleStopping, P, S>;
+    Minimiser::Params params;
+    params.beta = AnyBeta(method_);
+    params.splitting.by_islands = false;  // all bodies share the nodes of one grid
+    return hold<Minimiser>(params, window());
+  }
+
+private:
+  template <class Minimiser>
+  Made hold(typename Minimiser::Params params, int window) const {
+    params.preconditioner = preconditioner();
+    params.line_search = line_search_of(options_);
+    if constexpr (requires { params.linear; }) {
+      if (auto* armijo = std::get_if<SufficientDecrease::Params>(&params.line_search)) {
+        armijo->max_backtracks = newton_backtracks;
+      }
+    }
+    params.stop = stopping(window);
+    params.budget.max_iterations = options_.integer("max_iterations");
+    params.safeguard.on = options_.flag("safeguard");
+    return std::make_unique<Holder<Minimiser>>(params);
+  }
+
+  template <template <class, class> class Hessian>
+  struct With {
+    template <class Precision, class Space>
+    using Linear = Pcg<Precision, Space, Hessian>;
+  };
+  template <template <class, class> class Hessian>
+  Made newton_with() const {
+    using Minimiser = Newton<With<Hessian>::template Linear, GridPreconditioner, AnyLineSearch,
+                             ParticleStopping, P, S, AnyForcing>;
+    typename Minimiser::Params params;
+    params.linear.max_iterations = options_.integer("max_linear_iterations");
+    if (method_ == "newton") {
+      params.forcing = ForcingTerm::Params{.largest = options_.number("linear_tolerance")};
+    } else {
+      RootForcing::Params forcing;
+      if (by_characteristic_norm()) forcing.tolerance = options_.number("tolerance");
+      params.forcing = forcing;
+    }
+    return hold<Minimiser>(params, 1);
+  }
+  Made newton() const {
+    std::string const& hessian = options_.text("hessian");
+    if (method_ != "newton") {
+      return method_ == "pn_pcg_mf" ? newton_with<NumbersOfParticles>()
+                                    : newton_with<MatrixOfParticles>();
+    }
+    if (hessian == "direct") {
+      throw Error(
+          "solver.hessian = \"direct\" is compiled for meshes alone: choose assembled or "
+          "matrix_free");
+    }
+    return hessian == "matrix_free" ? newton_with<NumbersOfParticles>()
+                                    : newton_with<MatrixOfParticles>();
+  }
+
+  bool by_characteristic_norm() const { return options_.text("stopping") == "characteristic_norm"; }
+  ParticleStopping::Params stopping(int window) const {
+    if (!by_characteristic_norm()) return stopping_of(options_, window);
+    return CharacteristicNorm<S>::Params{.tolerance = options_.number("tolerance")};
+  }
+
+  bool multigrid() const { return particle_preconditioner(options_) == "multigrid"; }
+  /// A cycle reaches everything at once: fewer decrements tell what is left (mpm/grid_multigrid.hpp
+  /// with a window of 4 was never off by more than a factor of two).
+  int window() const { return multigrid() ? 4 : 8; }
+
+  GridPreconditioner<P, S>::Params preconditioner() const {
+    std::string const name = particle_preconditioner(options_);
+    constexpr Refresh once{.interval = std::numeric_limits<int>::max()};
+    if (method_ == "hot") return hot_cycle<HotCycle>(once);
+    if (method_ == "hot_quadratic") return hot_cycle<HotQuadraticCycle>(once);
+    if (method_ == "pn_mgpcg") return hot_cycle<HotCycle>({});
+    if (method_ == "lbfgs_h") return HessianByPcg::Params{};
+    if (method_.starts_with("pn_pcg")) return BlockJacobi<P, S>::Params{};
+    if (multigrid()) {
+      return Cycle::Params{.refresh = refresh_of(options_, Refresh::lagged(8))};
+    }
+    Refresh const refresh = refresh_of(options_, {});
+    if (name == "block_jacobi") return BlockJacobi<P, S>::Params{.refresh = refresh};
+    if (name == "jacobi") return Jacobi<P, S>::Params{.refresh = refresh};
+    if (name == "identity") return Identity<P, S>::Params{};
+    throw Error(
+        "solver.preconditioner = \"{}\" is one of meshes: choose multigrid, block_jacobi, jacobi "
+        "or "
+        "identity",
+        name);
+  }
+
+  /// Three levels, the coarsest solved by PCG to half of what comes down.
+  template <class HotLike>
+  static typename HotLike::Params hot_cycle(Refresh const& refresh) {
+    return {.refresh = refresh,
+            .cycle = {.max_levels = 3, .direct_nodes = 0, .coarse_tolerance = 0.5}};
+  }
+
+  SolverOptions const& options_;
+  std::string const method_;
+};
+
+}  // namespace
+
+std::string particle_preconditioner(SolverOptions const& options) {
+  std::string const& method = options.text("method");
+  if (method == "lbfgs_h") return "inverse_by_pcg";
+  if (method.starts_with("pn_pcg")) return "block_jacobi";
+  std::string const& asked = options.text("preconditioner");
+  bool const hot = method.starts_with("hot") || method == "pn_mgpcg";
+  return asked == "auto" || hot ? "multigrid" : asked;
+}
+
+std::span<MethodTitle const> particle_method_titles() {
+  static constexpr std::array titles{
+      MethodTitle{"lbfgs", "L-BFGS", "with the cycle of multigrid as metric: the default"},
+      MethodTitle{"hot", "HOT", "as published: fine matrix, symmetric Gauss-Seidel, 3 levels"},
+      MethodTitle{"hot_quadratic", "HOT-quadratic", "the same with quadratic embedding"},
+      MethodTitle{"lbfgs_h", "LBFGS-H", "L-BFGS, the first Hessian inverted by PCG as metric"},
+      MethodTitle{"pn_pcg", "PN-PCG", "projected Newton, PCG with block Jacobi on the matrix"},
+      MethodTitle{"pn_pcg_mf", "PN-PCG(MF)", "the same without a matrix"},
+      MethodTitle{"pn_mgpcg", "PN-MGPCG", "projected Newton, PCG with HOT's cycle"}};
+  return titles;
+}
+
+ParticleMinimiser::ParticleMinimiser(Params const& options) : minimiser_(Builder(options).make()) {}
+
+}  // namespace taut

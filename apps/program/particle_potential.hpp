@@ -1,0 +1,86 @@
+// The incremental potential of a scene of material points. The terms over the particles are chosen
+// by name, and made anew for the grid of every step (mpm/particle_stepper.hpp tells them).
+#pragma once
+
+#include <taut/core/fem/element_material.hpp>
+#include <taut/core/potential/any_terms.hpp>
+#include <taut/core/potential/potential.hpp>
+#include <taut/materials/elastic.hpp>
+#include <taut/mpm/particle_grid.hpp>
+#include <taut/mpm/particle_operator.hpp>
+#include <taut/mpm/slip.hpp>
+
+#include <algorithm>
+#include <functional>
+#include <limits>
+#include <span>
+#include <string_view>
+
+namespace taut {
+
+/// Particles are computed in fp64: they add up over all steps, and one precision compiles once.
+using ParticlePrecision = Fp64;
+using ParticleKernel = QuadraticSpline;
+using ProgramGrid = ParticleGrid<ParticleKernel, ParticlePrecision, DefaultSpace>;
+
+/// Terms over particles behind one type.
+class ParticleTerms : public AnyTerms<ParticlePrecision, DefaultSpace> {
+  using Base = AnyTerms<ParticlePrecision, DefaultSpace>;
+
+public:
+  using Points = Particles<ParticlePrecision, DefaultSpace>;
+  using GridBlocks = ProgramGrid::Blocks;
+  using Operator = ParticleOperator<ParticleKernel, ParticlePrecision::real, DefaultSpace>;
+
+  template <class Term>
+  void add(Term term) {
+    materials_ = std::min(materials_, term.material_count());
+    auto const held = Base::add(std::move(term));
+    told_.push_back([held](Points const& particles, GridBlocks const& blocks,
+                           GridNodes<DefaultSpace> const& grid,
+                           Positions const& rest) { held->update(particles, blocks, grid, rest); });
+    linearised_.push_back(
+        [held](Positions const& x, double scale, Operator& to) { held->linearise(x, scale, to); });
+    measured_.push_back([held](Array<double, DefaultSpace> const& force) {
+      held->add_characteristic_force(force);
+    });
+  }
+  int material_count() const { return materials_; }
+  void update(Points const& particles, GridBlocks const& blocks,
+              GridNodes<DefaultSpace> const& grid, Positions const& rest) const {
+    for (auto const& tell : told_) tell(particles, blocks, grid, rest);
+  }
+
+  /// For preconditioners that are made of particles. Throws Error unless one term holds all.
+  void linearise(Positions const& x, double scale, Operator& to) const {
+    if (linearised_.size() != 1) {
+      throw Error(
+          "{} models over the particles have no operator in common: take solver.preconditioner = "
+          "\"block_jacobi\"",
+          linearised_.size());
+    }
+    linearised_.front()(x, scale, to);
+  }
+  void add_characteristic_force(Array<double, DefaultSpace> const& force) const {
+    for (auto const& add : measured_) add(force);
+  }
+
+private:
+  int materials_ = std::numeric_limits<int>::max();
+  std::vector<std::function<void(Points const&, GridBlocks const&, GridNodes<DefaultSpace> const&,
+                                 Positions const&)>>
+      told_;
+  std::vector<std::function<void(Positions const&, double, Operator&)>> linearised_;
+  std::vector<std::function<void(Array<double, DefaultSpace> const&)>> measured_;
+};
+
+using ParticlePotential = Potential<Inertia<ParticlePrecision>, BodyForce<ParticlePrecision>,
+                                    ParticleTerms, Slip<ParticlePrecision>>;
+
+/// What ParticleBlocks are to be padded to for them.
+int particle_lanes();
+/// Adds the elastic term of a model. Throws Error for one that is not compiled.
+void add_particle_term(ParticleTerms& terms, std::string_view model,
+                       std::vector<Lame<double>> const& materials);
+
+}  // namespace taut

@@ -1,0 +1,35 @@
+// A scene of material points made ready to be stepped. A step of the program is a frame of the
+// scene, time.step seconds, which takes as many steps of the grid as its particles ask for.
+#pragma once
+
+#include <taut/apps/program/particle_geometry.hpp>
+#include <taut/apps/program/simulation.hpp>
+
+namespace taut {
+
+/// What a frame took besides what its minimiser reports.
+struct ParticleFrame {
+  int steps = 0;            ///< of the grid
+  int halvings = 0;         ///< of these, in all
+  int converged_steps = 0;  ///< of these
+  int nodes = 0;            ///< the most that the grid had
+  double travel_cells = 0;  ///< the farthest that a particle went in a step of the grid (a bound)
+};
+
+class ParticleSimulation : public Simulation {
+public:
+  /// Throws Error if the scene asks for what does not exist.
+  static std::unique_ptr<ParticleSimulation> create(Scene const& scene,
+                                                    SceneParticles const& particles);
+
+  /// Of the frame that ended last.
+  virtual ParticleFrame const& frame() const = 0;
+  virtual std::vector<Particle> particles() const = 0;
+  /// Of each point of the scene's result (result_mesh), in the order of particle_scalars().
+  virtual std::vector<std::vector<double>> scalars() const = 0;
+};
+
+/// Particles with J <= 0, or of which something is not a number, ascending.
+std::vector<std::size_t> broken_particles(std::vector<Particle> const& particles);
+
+}  // namespace taut

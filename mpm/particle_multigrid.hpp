@@ -1,0 +1,93 @@
+// The multigrid cycle as a preconditioner of any minimiser over particles, made from these at once:
+// by default without a fine matrix, whose level is smoothed by Chebyshev's polynomial on products
+// with 45 numbers per particle and patches where cells are cut (cut_cells.hpp), above coarser
+// levels in float that are assembled from the particles and smoothed by Gauss-Seidel. `assembled`:
+// with the fine matrix, as HOT has it (Wang et al. 2020).
+//
+// For potentials in which one term holds all particles, and others act on single nodes; where more
+// is coupled GridMultigrid takes the Hessian that the potential assembles.
+#pragma once
+
+#include <taut/core/potential/preconditioning.hpp>
+#include <taut/mpm/cut_cells.hpp>
+#include <taut/mpm/multigrid.hpp>
+#include <taut/mpm/particle_operator.hpp>
+
+namespace taut {
+
+/// `T` is the scalar of the coarser levels; the fine one has that of the gradient.
+template <bool assembled_ = false, class FineSmoother_ = Chebyshev,
+          class Smoother_ = ForwardBackward, class Embedding_ = LinearEmbedding, class T = float,
+          Spline K = QuadraticSpline>
+struct ParticleCyclePolicies {
+  using FineSmoother = FineSmoother_;
+  using Smoother = Smoother_;
+  using Embedding = Embedding_;
+  using Scalar = T;
+  using Kernel = K;
+  static constexpr bool assembled = assembled_;
+};
+
+template <class P = Mixed, class S = DefaultSpace, class Policies = ParticleCyclePolicies<>>
+class ParticleMultigrid {
+public:
+  using Real = typename P::real;
+  using Kernel = typename Policies::Kernel;
+  using Vectors = VectorField<Real, S>;
+  using Operator = ParticleOperator<Kernel, Real, S>;
+  static constexpr bool assembled = Policies::assembled;
+  using Fine = std::conditional_t<assembled, MatrixLevel<S, Real, Kernel::width - 1>,
+                                  PatchedLevel<Operator, S, Real, Kernel::width - 1>>;
+  using Cycle = Multigrid<Fine, typename Policies::FineSmoother, typename Policies::Smoother,
+                          typename Policies::Embedding, typename Policies::Scalar>;
+
+  struct Params {
+    Refresh refresh = Refresh::lagged(8);
+    CutCells cut_cells = {};  ///< where there is no fine matrix
+    typename Cycle::Params cycle = {};
+  };
+  static constexpr char const* name = "particle_multigrid";
+
+  ParticleMultigrid() : ParticleMultigrid(Params()) {}
+  explicit ParticleMultigrid(Params const& params) : params_(params), cycle_(params.cycle) {}
+
+  Refresh refresh() const { return params_.refresh; }
+  void resize(int n) { local_ = local_memory_.resize("node_curvature", n); }
+  LocalMatrices<P, S> const& curvature() const { return no_curvature_; }
+  bool pointwise() const { return false; }
+
+  /// Takes the Hessian at x, and builds the hierarchy.
+  template <class E>
+  void update(E& e, VectorField<typename P::position, S> const& x) {
+    e.linearise(x, operator_, local_);
+    operator_.set_local(local_, e.fixed());
+    if constexpr (assembled) {
+      fine_.resize(operator_.nodes(), operator_.fixed());
+      operator_.matrix(fine_.matrix());
+    } else {
+      fine_.resize(operator_.nodes(), operator_.fixed(), operator_);
+      fine_.set(params_.cut_cells);
+    }
+    fine_.finish();
+    cycle_.build(fine_);
+  }
+
+  /// z = P g. Allocates nothing.
+  void apply(Vectors const& g, Vectors const& z) const { cycle_.apply(g, z); }
+
+  MultigridReport const& report() const { return cycle_.report(); }
+  Cycle const& cycle() const { return cycle_; }
+  Fine const& fine() const { return fine_; }
+  Operator const& hessian() const { return operator_; }
+
+private:
+  Params params_;
+  LocalMatrices<P, S> no_curvature_;
+  BlockField<Real, S> local_;
+  Resizable<BlockField<Real, S>> local_memory_;
+  Operator operator_;
+  Fine fine_;
+  Cycle cycle_;
+};
+
+}  // namespace taut

@@ -1,0 +1,113 @@
+// The Hessian at an iterate without a matrix: the numbers of particle_operator_kernels.hpp, and a
+// block for each node of what acts on it alone (inertia, slip). What ActionLevel takes as the fine
+// level of a hierarchy: products, diagonal blocks, and the matrix of the next coarser level from
+// the particles at once. The fine matrix, too, where it is wanted.
+//
+// Who the particles are of is not known here: terms write the numbers (linearise).
+#pragma once
+
+#include <taut/mpm/particle_assembly.hpp>
+
+namespace taut {
+
+template <Spline K, class T_, class S_ = DefaultSpace, bool packed = S_::on_host>
+class ParticleOperator {
+public:
+  using S = S_;
+  using T = T_;
+  using Vectors = VectorField<T, S>;
+  using Blocks = BlockField<T, S>;
+  template <class N>
+  using List = Kokkos::View<N*, typename S::memory>;
+
+  /// A term takes it on: its particles are in `blocks`, which are bound to `nodes`; `team_size` is
+  /// how many threads do a patch. The numbers are then to be written.
+  void resize(BlockViews<K, S> const& blocks, GridNodes<S> const& nodes, int team_size) {
+    blocks_ = blocks;
+    nodes_ = nodes;
+    team_size_ = packed ? 1 : team_size;
+    constexpr int lanes = kernels::BlockSweep<S, T, K, packed>::lanes;
+    int const slots = (blocks.slots + lanes - 1) / lanes * lanes;
+    grow(numbers_, "operator_numbers", std::size_t(kernels::operator_numbers) * slots);
+    grow(partial_, "operator_partial", std::size_t(6) * BlockViews<K, S>::nodes * blocks.patches);
+  }
+  List<T> const& numbers() const { return numbers_; }
+  /// What acts on nodes alone, and which are fixed (not 0; those keep their block and nothing
+  /// else).
+  void set_local(Blocks const& local, FixedNodes<S> const& fixed) {
+    local_ = local;
+    fixed_ = fixed;
+  }
+
+  GridNodes<S> const& nodes() const { return nodes_; }
+  FixedNodes<S> const& fixed() const { return fixed_; }
+
+  /// y = A x
+  void product(Vectors const& x, Vectors const& y) const {
+    run("operator_product",
+        kernels::OperatorProduct<S, T, K, packed>{{{blocks_}, numbers_, partial_}, {fixed_, x}});
+    using Output = kernels::OperatorProductOutput<S, T>;
+    for_each<S>("operator_gather", nodes_.count,
+                kernels::GatherRows<S, T, K, 3, Output>{blocks_, partial_, {fixed_, local_, x, y}});
+  }
+  void diagonal(Blocks const& blocks) const {
+    run("operator_diagonal",
+        kernels::OperatorDiagonal<S, T, K, packed>{{{blocks_}, numbers_, partial_}});
+    using Output = kernels::OperatorDiagonalOutput<S, T>;
+    for_each<S>(
+        "operator_gather", nodes_.count,
+        kernels::GatherRows<S, T, K, 6, Output>{blocks_, partial_, {fixed_, local_, blocks}});
+  }
+  /// `coarse`, which has its nodes already, becomes P'AP.
+  template <class Embedding, class TM, int R>
+  void coarse_matrix(GridMatrix<S, TM, R> const& coarse) const {
+    set_zero(coarse);
+    add_particles<Embedding>(coarse, {});
+    for_each<S>("add_coarse_blocks", coarse.size(),
+                kernels::AddCoarseBlocks<S, Embedding, T, TM, R>{nodes_, fixed_, local_, coarse});
+  }
+  /// `matrix`, over the same nodes, becomes A, fixed nodes cut off.
+  template <class TM, int R>
+  void matrix(GridMatrix<S, TM, R> const& matrix) const {
+    set_zero(matrix);
+    add_rows(matrix, {});
+  }
+  /// Adds the rows of A of the nodes for which `row_of` is not negative to these rows of `matrix`;
+  /// where it is empty, all.
+  template <class TM, int R>
+  void add_rows(GridMatrix<S, TM, R> const& matrix, List<int const> const& row_of) const {
+    add_particles<NoEmbedding>(matrix, row_of);
+    for_each<S>("add_node_blocks", nodes_.count,
+                kernels::AddNodeBlocks<S, T, TM, R>{local_, row_of, matrix});
+  }
+  /// Bytes held.
+  std::size_t memory() const { return (numbers_.span() + partial_.span()) * sizeof(T); }
+
+private:
+  template <class Kernel>
+  void run(char const* name, Kernel const& kernel) const {
+    if (blocks_.patches == 0) return;
+    typename S::team_policy policy(S::instance(), blocks_.patches, team_size_);
+    policy.set_scratch_size(0, Kokkos::PerTeam(static_cast<int>(kernel.scratch_bytes())));
+    Kokkos::parallel_for(label(name), policy, kernel);
+  }
+  template <class Embedding, class TM, int R>
+  void add_particles(GridMatrix<S, TM, R> const& matrix, List<int const> const& row_of) const {
+    BlockColours<K, S> const colours(blocks_);
+    for (int c = 0; c < colours.colours; ++c) {
+      for_each<S>(
+          "assemble_cells", colours.size(c),
+          kernels::AssembleCells<S, T, K, Embedding, TM, R>{
+              blocks_, numbers_, fixed_, colours.order(), colours.begin(c), matrix, row_of});
+    }
+  }
+
+  BlockViews<K, S> blocks_;
+  GridNodes<S> nodes_;
+  FixedNodes<S> fixed_;
+  int team_size_ = 1;
+  List<T> numbers_, partial_;
+  Blocks local_;
+};
+
+}  // namespace taut

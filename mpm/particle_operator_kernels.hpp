@@ -1,0 +1,209 @@
+// The Hessian of particles at one iterate as 45 numbers for each: with G = Sum_n p_n (grad w_n)^T,
+// per cell, and vec by columns,
+//
+//   vec f_p = K_p vec G,      (H p)_n = Sum_p f_p grad w_np,
+//   K_p = h^2 V_p / dx^2 (F^n (x) 1) (d2Psi/dF2) (F^nT (x) 1),     9x9 and symmetric.
+//
+// A product reads these instead of decomposing F anew, and does not know of materials.
+#pragma once
+
+#include <taut/mpm/particle_kernels.hpp>
+
+namespace taut::kernels {
+
+/// Of a particle: t (3), and the lower triangle of K by rows.
+inline constexpr int operator_numbers = 48;
+KOKKOS_FORCEINLINE_FUNCTION constexpr int operator_number(int q, int r) {
+  return q >= r ? 3 + q * (q + 1) / 2 + r : 3 + r * (r + 1) / 2 + q;
+}
+
+/// Writes them.
+template <class S, class Precision, class Material, Spline K, bool packed>
+struct LineariseParticles : ParticleSweep<S, Precision, Material, K, packed> {
+  using Base = ParticleSweep<S, Precision, Material, K, packed>;
+  using Real = typename Base::Real;
+  using T = typename Base::T;
+  using Local = typename Base::Local;
+
+  Real scale;  ///< h^2
+  Kokkos::View<Real*, typename S::memory> to;
+
+  std::size_t scratch_bytes() const { return Base::row_bytes(3); }
+
+  KOKKOS_FUNCTION void operator()(typename S::team_member const& team) const {
+    int const patch = team.league_rank();
+    Local const local_x(team.team_scratch(0), 4 * Base::nodes);
+    this->load_relative(team, patch, this->displacement, local_x);
+    team.team_barrier();
+    auto const lame = this->lame(patch);
+    auto const points = this->points(patch, this->data.data());
+    Real* const out = to.data() + std::size_t(operator_numbers) * this->blocks.slot_begin(patch);
+    auto const body = [&](int g) __attribute__((always_inline)) {
+      Real* const own = out + std::size_t(g / Base::per_pack) * operator_numbers * Base::lanes +
+                        g % Base::per_pack * Base::width;
+      Mat3<T> const before = points.deformation(g);
+      auto const state = Material::evaluate(
+          lame,
+          before + this->change_of_F(points.weights(g), points.corners(g), local_x.data(), before));
+      auto const frame = Material::frame(state);
+      T const weight = T(scale / (this->dx * this->dx)) * points.weight(g);
+      Mat3<T> const to_b = transpose(before);
+      for (int k = 0; k < 3; ++k) store(points.number(g, k), own + k * Base::lanes);
+      for (int r = 0; r < 9; ++r) {
+        Mat3<T> dF;
+        for (int i = 0; i < 3; ++i)
+          for (int c = 0; c < 3; ++c) dF(i, c) = i == r % 3 ? before(r / 3, c) : T(0);
+        Mat3<T> const f = frame.apply(dF) * to_b;
+        for (int q = r; q < 9; ++q) {
+          store(T(weight * f.a[q]), own + operator_number(q, r) * Base::lanes);
+        }
+      }
+    };
+    Kokkos::parallel_for(Kokkos::TeamThreadRange(team, this->groups(patch)), body);
+  }
+};
+
+/// What sweeps with these numbers read.
+template <class S, class T_, Spline K, bool packed>
+struct OperatorSweep : BlockSweep<S, T_, K, packed> {
+  using Base = BlockSweep<S, T_, K, packed>;
+  using T = typename Base::Value;
+  Kokkos::View<T_ const*, typename S::memory> data;
+  Kokkos::View<T_*, typename S::memory> partial;
+
+  KOKKOS_FORCEINLINE_FUNCTION T_ const* group(int patch, int g) const {
+    return data.data() + std::size_t(operator_numbers) * this->blocks.slot_begin(patch) +
+           std::size_t(g / Base::per_pack) * operator_numbers * Base::lanes +
+           g % Base::per_pack * Base::width;
+  }
+  KOKKOS_FORCEINLINE_FUNCTION static T number(T_ const* group, int k) {
+    return load<T>(group + k * Base::lanes);
+  }
+  KOKKOS_FORCEINLINE_FUNCTION static Weights<K, T> weights(T_ const* group) {
+    return Weights<K, T>({number(group, 0), number(group, 1), number(group, 2)});
+  }
+};
+
+/// p, where fixed nodes do not move.
+template <class S, class T>
+struct FreeField {
+  Kokkos::View<std::uint8_t const*, typename S::memory> fixed;
+  VectorField<T, S> p;
+  KOKKOS_FORCEINLINE_FUNCTION T operator()(int node, int c) const {
+    return fixed(node) == 0 ? p(node, c) : T(0);
+  }
+};
+
+template <class S, class T_, Spline K, bool packed>
+struct OperatorProduct : OperatorSweep<S, T_, K, packed> {
+  using Base = OperatorSweep<S, T_, K, packed>;
+  using T = typename Base::T;
+  using Local = typename Base::Local;
+  FreeField<S, T_> p;
+
+  std::size_t scratch_bytes() const { return 2 * Base::row_bytes(3); }
+
+  KOKKOS_FUNCTION void operator()(typename S::team_member const& team) const {
+    int const patch = team.league_rank();
+    Local const local_p(team.team_scratch(0), 4 * Base::nodes);
+    Local const rows(team.team_scratch(0), 4 * Base::nodes);
+    this->load_relative(team, patch, p, local_p);
+    this->clear(team, rows, 3);
+    team.team_barrier();
+    std::uint16_t const* const corners =
+        this->blocks.corner.data() + this->blocks.slot_begin(patch);
+    auto const body = [&](int g, bool active) __attribute__((always_inline)) {
+      std::uint16_t const* const corner = corners + g * Base::width;
+      T_ const* const own = this->group(patch, g);
+      Weights<K, T> const at = this->weights(own);
+      Mat3<T> const G = this->gradient(at, corner, local_p.data());
+      Mat3<T> f;
+      for (int q = 0; q < 9; ++q) f.a[q] = T(0);
+      for (int q = 0; q < 9; ++q)
+        for (int r = 0; r <= q; ++r) {
+          T const k = this->number(own, operator_number(q, r));
+          f.a[q] = f.a[q] + k * G.a[r];
+          if (r != q) f.a[r] = f.a[r] + k * G.a[q];
+        }
+      auto const received = [&](int a, int b, int c, T(&row)[3]) __attribute__((always_inline)) {
+        Vec3<T> const fi = f * at.gradient(a, b, c);
+        for (int k = 0; k < 3; ++k) row[k] = fi[k];
+      };
+      this->template give<3>(team, active, corner, rows.data(), received);
+    };
+    this->in_rounds(team, patch, body);
+    team.team_barrier();
+    this->template take<3>(team, patch, rows, this->partial);
+  }
+};
+
+/// The diagonal blocks.
+template <class S, class T_, Spline K, bool packed>
+struct OperatorDiagonal : OperatorSweep<S, T_, K, packed> {
+  using Base = OperatorSweep<S, T_, K, packed>;
+  using T = typename Base::T;
+  using Local = typename Base::Local;
+
+  std::size_t scratch_bytes() const { return Base::row_bytes(6); }
+
+  KOKKOS_FUNCTION void operator()(typename S::team_member const& team) const {
+    int const patch = team.league_rank();
+    Local const rows(team.team_scratch(0), Base::padded(6) * Base::nodes);
+    this->clear(team, rows, 6);
+    team.team_barrier();
+    std::uint16_t const* const corners =
+        this->blocks.corner.data() + this->blocks.slot_begin(patch);
+    auto const body = [&](int g, bool active) __attribute__((always_inline)) {
+      T_ const* const own = this->group(patch, g);
+      Weights<K, T> const at = this->weights(own);
+      auto const received = [&](int a, int b, int c, T(&row)[6]) __attribute__((always_inline)) {
+        Vec3<T> const w = at.gradient(a, b, c);
+        constexpr int first[6] = {0, 1, 2, 0, 1, 0}, second[6] = {0, 1, 2, 1, 2, 2};
+        for (int k = 0; k < 6; ++k) {
+          row[k] = T(0);
+          for (int u = 0; u < 3; ++u) {
+            T sum(0);
+            for (int v = 0; v < 3; ++v) {
+              int const number = operator_number(first[k] + 3 * u, second[k] + 3 * v);
+              sum = sum + this->number(own, number) * w[v];
+            }
+            row[k] = row[k] + sum * w[u];
+          }
+        }
+      };
+      this->template give<6>(team, active, corners + g * Base::width, rows.data(), received);
+    };
+    this->in_rounds(team, patch, body);
+    team.team_barrier();
+    this->template take<6>(team, patch, rows, this->partial);
+  }
+};
+
+/// y = the sum, and what the node itself resists with.
+template <class S, class T>
+struct OperatorProductOutput {
+  Kokkos::View<std::uint8_t const*, typename S::memory> fixed;
+  BlockField<T, S> local;
+  VectorField<T, S> x, y;
+  template <int numbers>
+  KOKKOS_FORCEINLINE_FUNCTION void add(int node, T const (&sum)[numbers]) const {
+    Sym3<T> own;
+    for (int k = 0; k < 6; ++k) own.s[k] = local(node, k);
+    Vec3<T> const resisted = own * Vec3<T>{x(node, 0), x(node, 1), x(node, 2)};
+    bool const free = fixed(node) == 0;
+    for (int c = 0; c < 3; ++c) y(node, c) = resisted[c] + (free ? sum[c] : T(0));
+  }
+};
+
+template <class S, class T>
+struct OperatorDiagonalOutput {
+  Kokkos::View<std::uint8_t const*, typename S::memory> fixed;
+  BlockField<T, S> local, blocks;
+  template <int numbers>
+  KOKKOS_FORCEINLINE_FUNCTION void add(int node, T const (&sum)[numbers]) const {
+    bool const free = fixed(node) == 0;
+    for (int k = 0; k < 6; ++k) blocks(node, k) = local(node, k) + (free ? sum[k] : T(0));
+  }
+};
+
+}  // namespace taut::kernels

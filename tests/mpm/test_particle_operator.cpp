@@ -1,0 +1,250 @@
+// The Hessian of particles without a matrix, the matrices that are assembled from it, and the
+// cycles on either.
+#include <taut/materials/models.hpp>
+#include <taut/mpm/particle_multigrid.hpp>
+
+#include "particle_problem.hpp"
+
+namespace taut {
+namespace {
+
+template <class Precision, class Space, bool packed>
+using Of =
+    test::Combination<FixedCorotated, FullProjection, QuadraticSpline, Precision, Space, packed>;
+
+/// |a - b| / |b| over the nodes.
+template <class A, class B>
+double apart(A const& a, B const& b, int n, int numbers = 3) {
+  double square = 0, all = 0;
+  for (int i = 0; i < n; ++i)
+    for (int c = 0; c < numbers; ++c) {
+      double const d = double(a(i, c)) - double(b(i, c));
+      square += d * d;
+      all += double(b(i, c)) * double(b(i, c));
+    }
+  return std::sqrt(square / all);
+}
+
+/// A problem, its operator at x, and blocks of single nodes.
+template <class C>
+struct Linearised {
+  using S = typename C::Space;
+  using T = typename C::Precision::real;
+  using Operator = ParticleOperator<QuadraticSpline, T, S, C::packed>;
+  using Matrix = MatrixLevel<S, T, 2>;
+  test::Problem<C> problem;
+  Operator to;
+  int n;
+  BlockField<T, S> local;
+
+  explicit Linearised(int team = 0) : problem(team), n(problem.scene.nodes()), local("local", n) {
+    for (int i = 0; i < n; ++i) problem.fixed(i) = i % 11 == 3;
+    problem.term.linearise(problem.x, 0.01, to);
+    for (int i = 0; i < n; ++i)
+      for (int k = 0; k < 6; ++k) local(i, k) = T(k < 3 ? 2 + 0.1 * k + 0.01 * (i % 7) : 0.2 * k);
+    to.set_local(local, problem.fixed);
+  }
+  VectorField<T, S> vectors() const { return VectorField<T, S>("vectors", n); }
+  Matrix matrix() const {
+    Matrix level;
+    level.resize(to.nodes(), to.fixed());
+    to.matrix(level.matrix());
+    level.finish();
+    return level;
+  }
+};
+
+template <class C>
+void check(double round_off, int team = 0) {
+  Linearised<C> const l(team);
+  int const n = l.n;
+  auto const& problem = l.problem;
+  int fixed = 0;
+  for (int i = 0; i < n; ++i) fixed += problem.fixed(i);
+  REQUIRE(fixed > 0);
+
+  // The product, against the term's.
+  auto const found = l.vectors(), expected = l.vectors(), by_matrix = l.vectors();
+  auto const p = l.vectors();
+  for (int i = 0; i < n; ++i)
+    for (int c = 0; c < 3; ++c) p(i, c) = problem.p(i, c);
+  for (int i = 0; i < n; ++i)
+    for (int c = 0; c < 3; ++c)
+      if (problem.fixed(i)) p(i, c) = 0;
+  problem.term.add_product(problem.x, p, 0.01, problem.fixed, expected);
+  for (int i = 0; i < n; ++i) {
+    Vec3<double> const own = kernels::block_times<double>(
+        l.local, i, {double(p(i, 0)), double(p(i, 1)), double(p(i, 2))});
+    for (int c = 0; c < 3; ++c) expected(i, c) += typename Linearised<C>::T(own[c]);
+  }
+  // What fixed nodes are given has no effect on free ones.
+  for (int i = 0; i < n; ++i)
+    if (problem.fixed(i)) {
+      p(i, 0) = 1;
+      for (int c = 0; c < 3; ++c) expected(i, c) = l.local(i, c == 0 ? 0 : c == 1 ? 3 : 5);
+    }
+  l.to.product(p, found);
+  CHECK(apart(found, expected, n) < round_off);
+
+  // The matrix, against the product; its diagonal.
+  auto const level = l.matrix();
+  level.product(p, by_matrix);
+  CHECK(apart(by_matrix, expected, n) < round_off);
+  BlockField<typename Linearised<C>::T, typename C::Space> const diagonal("diagonal", n),
+      of_matrix("of_matrix", n);
+  l.to.diagonal(diagonal);
+  for (int i = 0; i < n; ++i) {
+    auto const d = symmetric_part(level.matrix().block(i, 0, 0, 0));
+    for (int k = 0; k < 6; ++k) of_matrix(i, k) = d.s[k];
+  }
+  CHECK(apart(diagonal, of_matrix, n, 6) < round_off);
+
+  // The coarse matrix, against P'AP of the fine one.
+  using Coarse = GridMatrix<typename C::Space, typename Linearised<C>::T, 2>;
+  GridLevel<typename C::Space> grid;
+  LeafList free;
+  auto const& nodes = l.to.nodes();
+  for (int leaf = 0; leaf < nodes.leaves.count; ++leaf) {
+    auto const& origin = nodes.leaves.origin;
+    free.origin.push_back({origin(leaf, 0), origin(leaf, 1), origin(leaf, 2)});
+    LeafMask& mask = free.mask.emplace_back();
+    for (int x = 0; x < 8; ++x) mask[x] = nodes.mask(leaf, x);
+  }
+  grid.coarsen(free, 1, nodes.dx);
+  Coarse at_once, by_galerkin;
+  at_once.resize(grid.nodes());
+  by_galerkin.resize(grid.nodes());
+  l.to.template coarse_matrix<LinearEmbedding>(at_once);
+  level.template coarse_matrix<LinearEmbedding>(by_galerkin);
+  REQUIRE(at_once.size() > 20);
+  CHECK(apart(at_once.entry, by_galerkin.entry, at_once.size(), Coarse::Row::numbers) < round_off);
+}
+
+TEST_CASE("particles make their operator, its matrix and the coarser one", "[mpm][operator]") {
+  check<Of<Fp64, test::Right<DefaultSpace>, true>>(1e-13);
+}
+TEST_CASE("the same in float, by threads of a particle each, in a device's layout",
+          "[mpm][operator]") {
+  check<Of<Mixed, test::Left<DefaultSpace>, false>>(1e-5, test::team_sizes<DefaultSpace>().back());
+}
+
+TEST_CASE("a cycle without a fine matrix is that of the matrix", "[mpm][operator]") {
+  using C = Of<Fp64, test::Right<DefaultSpace>, true>;
+  using S = C::Space;
+  Linearised<C> const l;
+  auto const level = l.matrix();
+  ActionLevel<Linearised<C>::Operator, S, double> action;
+  action.resize(l.to.nodes(), l.to.fixed(), l.to);
+  action.finish();
+  auto const g = l.vectors(), by_action = l.vectors(), by_matrix = l.vectors();
+  for (int i = 0; i < l.n; ++i)
+    for (int c = 0; c < 3; ++c) g(i, c) = l.problem.fixed(i) ? 0 : std::sin(3.0 * i + c);
+  Multigrid<decltype(action), Chebyshev, ForwardBackward, LinearEmbedding, double> free(
+      {.direct_nodes = 20});
+  free.build(action);
+  free.apply(g, by_action);
+  Multigrid<MatrixLevel<S, double, 2>, Chebyshev, ForwardBackward, LinearEmbedding, double> cycle(
+      {.direct_nodes = 20});
+  cycle.build(level);
+  cycle.apply(g, by_matrix);
+  CHECK(free.report().nodes == cycle.report().nodes);
+  REQUIRE(free.report().nodes.size() > 2);
+  CHECK(apart(by_action, by_matrix, l.n) < 1e-11);
+}
+
+TEST_CASE("cut cells are solved with by patches", "[mpm][operator]") {
+  using C = Of<Fp64, test::Right<DefaultSpace>, true>;
+  using S = C::Space;
+  Linearised<C> const l;
+  auto const matrix = l.matrix();
+  GridNodes<S> const& nodes = l.to.nodes();
+  PatchedLevel<Linearised<C>::Operator, S, double> level;
+  level.resize(nodes, l.to.fixed(), l.to);
+  CutCells const params{.ratio = 0.05};
+  level.set(params);
+  level.finish();
+  auto const r = l.vectors(), expected = l.vectors();
+  for (int i = 0; i < l.n; ++i)
+    for (int c = 0; c < 3; ++c) r(i, c) = std::sin(2.0 * i + c);
+
+  // Node k of 27 around i, if it is free.
+  auto const around = [&](int i, int k) {
+    int const j = nodes.node(nodes.ijk(i, 0) + k / 9 - 1, nodes.ijk(i, 1) + k / 3 % 3 - 1,
+                             nodes.ijk(i, 2) + k % 3 - 1);
+    return j >= 0 && !l.problem.fixed(j) ? j : -1;
+  };
+  auto const block = [&](int i, int j) {
+    return matrix.matrix().block(i, nodes.ijk(j, 0) - nodes.ijk(i, 0),
+                                 nodes.ijk(j, 1) - nodes.ijk(i, 1),
+                                 nodes.ijk(j, 2) - nodes.ijk(i, 2));
+  };
+  std::vector<int> cut, held(l.n, 0);
+  for (int i = 0; i < l.n; ++i) {
+    if (l.problem.fixed(i)) continue;
+    double most = 0;
+    for (int k = 0; k < 27; ++k) {
+      if (int const j = around(i, k); j >= 0) {
+        most = std::max(most, contract(block(j, j), identity3<double>()));
+      }
+    }
+    if (!(contract(block(i, i), identity3<double>()) < params.ratio * most)) continue;
+    cut.push_back(i);
+    for (int k = 0; k < 27; ++k)
+      if (int const j = around(i, k); j >= 0) ++held[j];
+  }
+  REQUIRE(cut.size() > 3);
+  CHECK(level.patches() == int(cut.size()));
+  for (int i = 0; i < l.n; ++i) {
+    if (held[i] > 0) continue;
+    auto const z = kernels::block_times<double>(
+        level.inverse(), i, {double(r(i, 0)), double(r(i, 1)), double(r(i, 2))});
+    for (int c = 0; c < 3; ++c) expected(i, c) = z[c];
+  }
+  for (int const i : cut) {
+    std::vector<double> a(81 * 81, 0.0);
+    for (int v = 0; v < 81; ++v) a[82 * v] = 1;
+    for (int v = 0; v < 27; ++v)
+      for (int w = 0; w < 27; ++w) {
+        int const from = around(i, v), to = around(i, w);
+        if (from < 0 || to < 0) continue;
+        bool near = true;
+        for (int c = 0; c < 3; ++c)
+          near = near && std::abs(nodes.ijk(from, c) - nodes.ijk(to, c)) <= 2;
+        REQUIRE(near);
+        Mat3<double> const b = block(from, to);
+        for (int c = 0; c < 9; ++c) a[81 * (3 * v + c % 3) + 3 * w + c / 3] = b.a[c];
+      }
+    REQUIRE(invert_positive(a, 81, 1e-16) == 0);
+    for (int v = 0; v < 81; ++v) {
+      int const to = around(i, v / 3);
+      if (to < 0) continue;
+      for (int w = 0; w < 81; ++w) {
+        int const from = around(i, w / 3);
+        if (from < 0) continue;
+        expected(to, v % 3) +=
+            a[81 * v + w] * r(from, w % 3) / std::sqrt(double(held[to]) * held[from]);
+      }
+    }
+  }
+  CHECK(apart(level.preconditioned(r), expected, l.n) < 1e-9);
+}
+
+TEST_CASE("matrices of particles do not depend on the number of threads", "[mpm][operator]") {
+  using C = Of<Fp64, test::Right<DefaultSpace>, true>;
+  auto const numbers = [] {
+    Linearised<C> const l;
+    auto const level = l.matrix();
+    auto const& entry = level.matrix().entry;
+    auto const y = l.vectors();
+    l.to.product(l.problem.p, y);
+    std::vector<double> all(y.data(), y.data() + 3 * l.n);
+    for (int i = 0; i < l.n; ++i)
+      for (int k = 0; k < StencilRow<2>::numbers; ++k) all.push_back(entry(i, k));
+    return all;
+  };
+  auto const results = test::on_one_thread_and_all(numbers);
+  CHECK(results[0] == results[1]);
+}
+
+}  // namespace
+}  // namespace taut

@@ -1,0 +1,257 @@
+// Scenes of material points: all that come with the program run in their small versions, a run goes
+// on bitwise, methods agree, and mistakes are answered by a sentence.
+#include "scene_run.hpp"
+
+#include <taut/apps/program/particle_simulation.hpp>
+#include <taut/core/report/error.hpp>
+
+#include <fmt/format.h>
+#include <catch2/generators/catch_generators.hpp>
+#include <catch2/matchers/catch_matchers_exception.hpp>
+#include <catch2/matchers/catch_matchers_floating_point.hpp>
+#include <catch2/matchers/catch_matchers_string.hpp>
+
+#include <cmath>
+
+using namespace taut;
+using namespace taut::test;
+using Catch::Matchers::ContainsSubstring;
+using Catch::Matchers::MessageMatches;
+using Catch::Matchers::WithinAbs;
+using Catch::Matchers::WithinRel;
+
+namespace {
+
+/// A run of a scene of the program.
+struct BuiltIn {
+  ScratchFolder folder;
+  RunOptions options;
+
+  BuiltIn(std::string const& scene, std::vector<std::string> overrides) {
+    options.scene.scene = (scene_folder() / (scene + ".toml")).string();
+    options.scene.changes = {.small = true, .overrides = std::move(overrides)};
+    options.out = folder.write("place", "").parent_path() / "result";
+  }
+  Scene scene() const { return load_scene(options.scene.scene, options.scene.changes); }
+  ResultReader result() const { return ResultReader(options.out / "result.vtkhdf"); }
+  nlohmann::json summary() const {
+    return nlohmann::json::parse(read_file(options.out / "summary.json"));
+  }
+};
+
+struct Trial {
+  char const* scene;
+  int frames;
+  double mass;  ///< kg, of the shapes
+};
+
+double deepest(Scene const& scene, ResultReader const& result, double time) {
+  double depth = 0;
+  BoundaryList<Space<Kokkos::DefaultHostExecutionSpace>> walls(boundary_specs(*scene.particles));
+  walls.set_time(time);
+  auto const x = result.positions(result.frames() - 1);
+  for (std::size_t k = 0; k < scene.particles->boundaries.size(); ++k) {
+    if (scene.particles->boundaries[k].law == BoundaryLaw::stick) continue;
+    for (std::size_t p = 0; p < result.mesh().particles; ++p) {
+      Vec3<double> normal;
+      depth = std::max(depth, -walls.list()(k).distance({x[p][0], x[p][1], x[p][2]}, normal));
+    }
+  }
+  return depth;
+}
+
+constexpr double pi = 3.14159265358979323846;
+
+/// A cube of rubber above a floor.
+std::string const plain = R"(name = "cube"
+gravity = [0, -10, 0]
+
+[time]
+step = 0.01
+frames = 2
+
+[grid]
+spacing = 0.1
+
+[[object]]
+name = "cube"
+shape = { kind = "box", size = [0.4, 0.4, 0.4] }
+translate = [0, 0.2, 0]
+material = { young = 1e5, poisson = 0.3, density = 1000 }
+
+[[boundary]]
+name = "floor"
+shape = { kind = "half_space" }
+contact = "separate"
+)";
+
+std::string spoilt(std::string const& old, std::string const& by) {
+  std::string text = plain;
+  auto const at = text.find(old);
+  REQUIRE(at != std::string::npos);
+  return text.replace(at, old.size(), by);
+}
+
+void refused(std::string const& old, std::string const& by, std::string const& sentence) {
+  SceneRun const run("cube.toml", spoilt(old, by));
+  CHECK_THROWS_MATCHES(run_command(run.options), Error,
+                       MessageMatches(ContainsSubstring(sentence)));
+}
+
+}  // namespace
+
+TEST_CASE("small scenes of material points run clean", "[particles][scenes]") {
+  double const torus = 2 * pi * pi * 0.2 * 0.04 * 0.04;
+  Trial const trial =
+      GENERATE_COPY(values<Trial>({{"twist", 1, -1},
+                                   {"boxes", 1, -1},
+                                   {"chain", 1, 7 * 2000 * torus},
+                                   {"bar_sweep", 1, 2000 * 0.12 * 0.12 * 0.9},
+                                   {"stretched_box", 2, 1000 * 0.125},
+                                   {"sand_column", 1, 1600 * pi * 0.01 * 0.1},
+                                   {"taylor_bar", 1, 8930 * pi * 0.0032 * 0.0032 * 0.0324},
+                                   {"snowball", 3, 400 * 4 * pi * 1e-3 / 3},
+                                   {"donut", 1, -1}}));
+  CAPTURE(trial.scene);
+  BuiltIn run(trial.scene, {fmt::format("time.frames={}", trial.frames)});
+  // A frame of these is ten steps of the grid: one will do.
+  double const longest = run.scene().particles->longest_step.value_or(1);
+  if (trial.frames == 1 && longest < run.scene().step)
+    run.options.scene.changes.overrides.push_back(fmt::format("time.step={}", longest));
+  CHECK(run_command(run.options) == 0);
+  auto const summary = run.summary();
+  CHECK(summary.at("ended") == "finished");
+  CHECK(summary.at("steps_converged") == trial.frames);
+  CHECK(summary.at("steps_with_inverted_elements") == 0);
+  if (trial.mass > 0) CHECK_THAT(double(summary.at("mass_kg")), WithinRel(trial.mass, 1e-9));
+  CHECK(check_command(run.options.out) == 0);
+  Scene const scene = run.scene();
+  // Nodes keep to the walls, and particles are between nodes.
+  CHECK(deepest(scene, run.result(), trial.frames * scene.step) < scene.particles->spacing);
+}
+
+TEST_CASE("two disks meet, bounce and keep their momentum", "[particles][truth]") {
+  BuiltIn const run("colliding_disks", {});
+  REQUIRE(run_command(run.options) == 0);
+  ResultReader const result = run.result();
+  std::size_t const n = result.mesh().particles;
+  /// Per mass of a disk.
+  auto const momentum = [&](std::int64_t frame, int object) {
+    Point sum{};
+    double count = 0;
+    auto const v = result.velocities(frame);
+    for (std::size_t p = 0; p < n; ++p) {
+      if (result.mesh().object[p] != object) continue;
+      sum = sum + v[p];
+      ++count;
+    }
+    return (1 / count) * sum;  // both disks have one mass, their particles do not
+  };
+  auto const energy = [&](std::int64_t frame) {
+    double sum = 0;
+    auto const v = result.velocities(frame);
+    for (std::size_t p = 0; p < n; ++p) sum += 0.5 * dot(v[p], v[p]) / double(n);
+    return sum;
+  };
+  std::int64_t const last = result.frames() - 1;
+  Point const before = momentum(0, 0) + momentum(0, 1),
+              after = momentum(last, 0) + momentum(last, 1);
+  for (std::size_t c : {0u, 2u}) CHECK_THAT(after[c], WithinAbs(before[c], 1e-6));
+  double least = energy(0);
+  for (std::int64_t frame = 0; frame <= last; ++frame) least = std::min(least, energy(frame));
+  CHECK(least < 0.5 * energy(0));     // it has become strain
+  CHECK(energy(last) > 1.5 * least);  // and comes back, less what implicit Euler takes
+  CHECK(energy(last) < energy(0));
+  CHECK(momentum(0, 0)[0] > 0.04);
+  CHECK(momentum(last, 0)[0] < -0.02);
+  CHECK(momentum(last, 1)[2] > 0.02);
+}
+
+TEST_CASE("a run of material points goes on bitwise", "[particles]") {
+  BuiltIn whole("snowball", {"time.frames=4"}), first("snowball", {"time.frames=2"});
+  REQUIRE(run_command(whole.options) == 0);
+  REQUIRE(run_command(first.options) == 0);
+  first.options.scene.changes.overrides = {"time.frames=4"};
+  first.options.restart = true;
+  REQUIRE(run_command(first.options) == 0);
+  ResultReader const a = whole.result(), b = first.result();
+  REQUIRE(a.frames() == b.frames());
+  for (std::int64_t frame = 0; frame < a.frames(); ++frame) {
+    CHECK(a.positions(frame) == b.positions(frame));
+    CHECK(a.velocities(frame) == b.velocities(frame));
+    for (std::string const& name : particle_scalars())
+      CHECK(a.scalar(name, frame) == b.scalar(name, frame));
+  }
+  auto const summary = first.summary();
+  CHECK(summary.at("grid_steps") == whole.summary().at("grid_steps"));
+}
+
+TEST_CASE("all methods find the same step", "[particles]") {
+  auto const step = [&](std::vector<std::string> overrides) {
+    overrides.push_back("solver.tolerance=1e-6");
+    SceneRun const run("cube.toml", plain, std::move(overrides));
+    Scene const scene = run.scene();
+    SceneParticles const particles = build_particles(scene);
+    auto const simulation = ParticleSimulation::create(scene, particles);
+    CHECK(simulation->step().converged());
+    return simulation->positions();
+  };
+  auto const exact = step({"solver.method=newton", "solver.tolerance=1e-9"});
+  std::vector<std::string> const other = GENERATE(values<std::vector<std::string>>(
+      {{"solver.method=lbfgs"},
+       {"solver.method=dk"},
+       {"solver.method=newton", "solver.hessian=matrix_free", "solver.preconditioner=jacobi"},
+       {"solver.method=lbfgs", "solver.preconditioner=block_jacobi"},
+       {"solver.method=bfgs", "solver.preconditioner=identity"},
+       {"solver.method=hot"},
+       {"solver.method=hot_quadratic"},
+       {"solver.method=lbfgs_h"},
+       {"solver.method=pn_pcg"},
+       {"solver.method=pn_pcg_mf"},
+       {"solver.method=pn_mgpcg"}}));
+  CAPTURE(other);
+  auto const x = step(other);
+  double worst = 0;
+  for (std::size_t p = 0; p < x.size(); ++p) worst = std::max(worst, norm(x[p] - exact[p]));
+  CHECK(worst < 1e-5 * 0.1);
+}
+
+TEST_CASE("mistakes in a scene of material points are answered by a sentence", "[particles]") {
+  refused("spacing = 0.1", "spacing = 0", "grid.spacing is 0: it must be");
+  refused("spacing = 0.1", "spacing = 0.5",
+          "grid are 0.5 m wide and object cube only 0.4 m: lower grid.spacing");
+  refused("spacing = 0.1", "spacing = 0.1\nper_cell = 1e-4", "has no room for a particle");
+  refused("spacing", "spacin", "unknown key 'grid.spacin', the nearest is 'spacing'");
+  refused("step = 0.01", "step = 0", "time.step is 0");
+  refused("kind = \"box\"", "kind = \"bowl\"", "object.cube.shape.kind is 'bowl'");
+  refused("[0.4, 0.4, 0.4]", "[0.4, 0.4, 0.4], resolution = 3", "grid.spacing");
+  refused("young = 1e5", "model = \"arap\", young = 1e5", "object.cube.material.model is 'arap'");
+  refused("young = 1e5", "plasticity = { kind = \"clay\" }, young = 1e5", "is 'clay'");
+  refused("young = 1e5", "plasticity = { kind = \"von_mises\" }, young = 1e5", "yield_stress");
+  refused("translate = [0, 0.2, 0]", "translate = [0, 0.1, 0]",
+          "object cube starts in boundary floor");
+  refused("translate = [0, 0.2, 0]", "without = [\"cub\"]", "there is no other object 'cub'");
+  refused("contact = \"separate\"", "contact = \"stick\"\nfriction = 1", "choose slip or separate");
+  refused("contact = \"separate\"", "contact = \"glue\"", "boundary.floor.contact is 'glue'");
+  refused("[grid]", "[solver]\npreconditioner = \"schwarz_32\"\n\n[grid]", "is one of meshes");
+  refused("[grid]", "[solver]\nprecision = \"fp32\"\n\n[grid]", "material points take fp64");
+  refused("[[boundary]]", "[contact]\n\n[[boundary]]", "contact is for meshes");
+  refused("gravity = [0, -10, 0]", "gravity = [0, -10, 0]\n[[pin]]\nname = \"a\"",
+          "pin is for meshes");
+  refused("frames = 2", "frames = 2\nintegrator = \"bdf2\"", "implicit_euler alone");
+  refused("shape = { kind = \"box\", size = [0.4, 0.4, 0.4] }", "mesh = \"there_is_none.obj\"",
+          "there_is_none.obj");
+  refused("name = \"floor\"", "name = \"cube\"", "the name 'cube' is taken");
+  SceneRun const meshes("plain.toml", plain_scene + "\n[[boundary]]\nname = \"a\"\n");
+  CHECK_THROWS_MATCHES(run_command(meshes.options), Error,
+                       MessageMatches(ContainsSubstring("make it an [[obstacle]]")));
+  SceneRun const metric("plain.toml", plain_scene, {"solver.preconditioner=multigrid"});
+  CHECK_THROWS_MATCHES(run_command(metric.options), Error,
+                       MessageMatches(ContainsSubstring("needs the nodes of a grid")));
+  SceneRun const method("plain.toml", plain_scene, {"solver.method=hot"});
+  CHECK_THROWS_MATCHES(run_command(method.options), Error,
+                       MessageMatches(ContainsSubstring("is of scenes of material points")));
+  SceneRun const rule("plain.toml", plain_scene, {"solver.stopping=characteristic_norm"});
+  CHECK_THROWS_MATCHES(run_command(rule.options), Error,
+                       MessageMatches(ContainsSubstring("is of scenes of material points")));
+}
