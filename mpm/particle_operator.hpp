@@ -86,10 +86,7 @@ public:
 private:
   template <class Kernel>
   void run(char const* name, Kernel const& kernel) const {
-    if (blocks_.patches == 0) return;
-    typename S::team_policy policy(S::instance(), blocks_.patches, team_size_);
-    policy.set_scratch_size(0, Kokkos::PerTeam(static_cast<int>(kernel.scratch_bytes())));
-    Kokkos::parallel_for(label(name), policy, kernel);
+    for_each_team<S>(name, blocks_.patches, team_size_, kernel.scratch_bytes(), kernel);
   }
   template <class Embedding, class TM, int R>
   void add_particles(GridMatrix<S, TM, R> const& matrix, List<int const> const& row_of) const {
