@@ -14,8 +14,8 @@ struct ChartPolicy {
 };
 
 /// Every other choice of bound, barrier, mollifier, curvature and stiffness that the program knows,
-/// one at a time, and those of the PNCG paper together. What has units is from the scene's stiffest
-/// material.
+/// one at a time, and those of the PNCG paper together; the solver stays as it is. What has units
+/// is from the scene's stiffest material.
 std::vector<ChartPolicy> default_policies(Scene const& scene);
 
 /// Reads KEY=VALUE[:KEY=VALUE...], where a KEY without a table is one of [contact]; "default" is

@@ -18,7 +18,7 @@ std::vector<std::string> const reference_solver{"solver.method=newton",
                                                 "solver.refresh=always",
                                                 "solver.stopping=decrement_window",
                                                 "solver.tolerance=1e-12",
-                                                "solver.max_iterations=200",
+                                                "solver.max_iterations=1000",
                                                 "solver.linear_tolerance=1e-3",
                                                 "solver.max_linear_iterations=100000"};
 

@@ -334,7 +334,7 @@ def main():
     if rated:
         figure.subplots_adjust(hspace=0.3, top=1 - 1.15 / inches)
     if facts["kind"] == "stability":
-        figure.subplots_adjust(left=0.19, right=0.72)
+        figure.subplots_adjust(left=0.22, right=0.7)
     for name in facts.keys() - {"with"}:
         facts[name] = re.sub(r"e\+0?", "e", facts[name])
     title = ", ".join([facts["scene"], *facts.get("with", [])])
