@@ -4,8 +4,10 @@
 #include <taut/core/io/file.hpp>
 #include <taut/core/report/error.hpp>
 
+#include <fmt/ranges.h>
 #include <Kokkos_Core.hpp>
 
+#include <algorithm>
 #include <cmath>
 
 namespace taut {
@@ -21,17 +23,18 @@ std::vector<Contestant> contestants(std::filesystem::path const& scene, SceneCha
 }
 
 std::string describe(Scene const& scene, SceneGeometry const& geometry) {
-  std::string materials;
+  std::vector<std::string> materials;  // copies of an object have one each
   for (MaterialParameters const& m : geometry.materials) {
-    materials += fmt::format("{}{} (E = {:g} Pa, nu = {:g})", materials.empty() ? "" : ", ",
-                             m.model, m.young, m.poisson);
+    std::string text = fmt::format("{} (E = {:g} Pa, nu = {:g})", m.model, m.young, m.poisson);
+    if (std::find(materials.begin(), materials.end(), text) == materials.end())
+      materials.push_back(std::move(text));
   }
   constexpr char const* schemes[] = {"implicit Euler", "BDF2", "quasi-static"};
   return fmt::format(
       "# scene = {}\n# tets = {}\n# vertices = {}\n# materials = {}\n# integrator = {}\n"
       "# step_s = {:g}\n# threads = {}\n",
-      scene.name, geometry.mesh.tets.size(), geometry.mesh.points.size(), materials,
-      schemes[static_cast<int>(scene.scheme)], scene.step,
+      scene.name, geometry.mesh.tets.size(), geometry.mesh.points.size(),
+      fmt::join(materials, ", "), schemes[static_cast<int>(scene.scheme)], scene.step,
       Kokkos::DefaultExecutionSpace().concurrency());
 }
 
@@ -74,14 +77,29 @@ int chart_command(ChartOptions const& options) {
     throw Error("{}: a chart is there already: choose another --out or replace it with --force",
                 out.string());
   }
+  if (options.sweep && options.stability) throw Error("--sweep and --stability: choose one");
+  bool const compares = !options.sweep && !options.stability;
+  if (!compares && (!options.with.empty() || options.without_contact)) {
+    throw Error("--with and --without-contact are of a comparison: leave out --{}",
+                options.sweep ? "sweep" : "stability");
+  }
+  if (!options.stability && !options.policies.empty()) {
+    throw Error("--policies are what --stability compares: add it, or name --methods");
+  }
+  if (options.stability && !(options.methods.empty() && options.frames.empty())) {
+    throw Error("--stability takes --policies instead of --methods and --frame");
+  }
   std::vector<ChartMethod> const methods = parse_methods(options.methods);
   // A folder that cannot be written shows now and not when all is measured.
   std::filesystem::path const probe = out / ".taut";
   write_file_atomically(probe, "");
   std::filesystem::remove(probe);
-  write_file_atomically(data, options.sweep ? sweep_methods(scene, options, methods)
-                                            : compare_methods(scene, options, methods));
-  fmt::print("data     {}\n", data.string());
+  std::string const table = options.stability ? stability_of_policies(scene, options)
+                            : options.sweep   ? sweep_methods(scene, options, methods)
+                                              : compare_methods(scene, options, methods);
+  write_file_atomically(data, table);
+  write_file_atomically(out / "data.json", to_json(table));
+  fmt::print("data     {}, data.json\n", data.string());
   if (options.draw) {
     run_drawing({"draw_chart.py", {"matplotlib"}, {"matplotlib>=3.7,<4"}},
                 {data.string(), (out / "chart").string()}, data);

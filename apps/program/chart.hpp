@@ -4,7 +4,8 @@
 // for every method, preconditioner and stiffness.
 //
 // With `sweep`, the iterations and seconds to an error of `target` against the swept value of the
-// scene.
+// scene. With `stability`, no errors: how far policies of contact bring the scene until a step is
+// not clean.
 #pragma once
 
 #include <taut/apps/program/commands.hpp>
@@ -20,19 +21,25 @@ struct ChartOptions {
   std::vector<std::string> methods;
   std::vector<int>
       frames;  ///< time steps to compare, counted from 1; empty: the tenth, or the last
+  std::vector<std::string> with;  ///< other scenes in the same chart; overrides hold for all
+  bool without_contact = false;   ///< also the same steps, from the same states, without contact
   bool sweep = false;
+  bool stability = false;
+  /// Of `stability`: KEY=VALUE[:KEY=VALUE...] of [contact], or of another table as TABLE.KEY; empty
+  /// or "all": those of `default_policies`.
+  std::vector<std::string> policies;
   double target = 0.01;          ///< a method that ends above this error has failed
   double lowest = 1e-8;          ///< below this error a curve ends
   std::optional<double> length;  ///< m, what errors are relative to; by default the step's motion
   int max_iterations = 2000;
-  double max_seconds = 60;    ///< per method, while its errors are recorded
+  double max_seconds = 60;    ///< per method, while its errors are recorded; or per policy
   int repetitions = 3;        ///< of the runs that are timed
   std::filesystem::path out;  ///< empty: charts/NAME
   bool force = false;         ///< replaces a chart that is there
-  bool draw = true;           ///< false: data.csv alone, no Python
+  bool draw = true;           ///< false: no pictures, no Python
 };
 
-/// Writes data.csv, chart.svg and chart.png. Throws Error.
+/// Writes data.csv, data.json, chart.svg and chart.png. Throws Error.
 int chart_command(ChartOptions const& options);
 
 }  // namespace taut

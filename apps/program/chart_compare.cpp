@@ -1,79 +1,150 @@
 #include <taut/apps/program/chart_table.hpp>
 #include <taut/apps/program/chart_trace.hpp>
 #include <taut/apps/program/memory.hpp>
+#include <taut/core/report/error.hpp>
 
 #include <algorithm>
 
 namespace taut {
 namespace {
 
-std::string describe(ReferenceStep const& reference, StepMeasure const& measure) {
-  return fmt::format(
-      "# frame {0} length_m = {1:.6g}\n# frame {0} reference = newton fp64, {2} iterations, {3}\n"
-      "# frame {0} reference_last_move = {4:.3g}\n",
-      reference.step, measure.length(), reference.iterations, to_string(reference.stop),
-      reference.last_move / measure.length());
+/// What contact is worth in iterations: the same bodies pass through each other and obstacles.
+Scene without_contact(Scene scene) {
+  for (SceneObstacle const& obstacle : scene.obstacles) {
+    if (!obstacle.is_surface()) continue;
+    throw Error("--without-contact: {} is a mesh, whose vertices are in the state of the scene: {}",
+                obstacle.where, "compare scenes whose obstacles are half spaces or walls");
+  }
+  scene.obstacles.clear();
+  scene.contact.reset();
+  return scene;
 }
 
-std::string rows(int frame, std::string const& label, Trace const& trace) {
-  // A method that took no step at all still has a row to say so.
-  if (trace.points.empty()) return fmt::format("{},{},0,,,,{}\n", frame, label, trace.ended);
-  std::string text;
-  for (std::size_t k = 0; k < trace.points.size(); ++k) {
-    TracePoint const& p = trace.points[k];
-    text += fmt::format("{},{},{},{},{},{},{}\n", frame, label, k + 1, field(p.seconds),
-                        field(p.position_error), field(p.energy_gap),
-                        k + 1 == trace.points.size() ? trace.ended : "");
+/// The rows of a chart, and what it says about the steps that they belong to.
+class Comparison {
+public:
+  Comparison(std::filesystem::path const& first, ChartOptions const& options,
+             std::vector<ChartMethod> const& methods)
+      : options_(options), methods_(methods), files_{first} {
+    for (std::string const& scene : options.with) files_.push_back(find_scene(scene));
+    // Everything is checked before anything is measured.
+    for (auto const& file : files_) load_contestants(file);
   }
-  return text;
-}
 
-void say(std::string const& label, Trace const& trace, double target) {
-  std::string iterations = "-", seconds = "-";
-  if (auto const k = trace.reached(target)) {
-    iterations = std::to_string(*k);
-    seconds = fmt::format("{:.4g}", trace.points[*k - 1].seconds);
+  std::string run() {
+    for (auto const& file : files_) run(file);
+    return header_ + "scene,frame,method,iteration,seconds,position_error,energy_gap,ended\n" +
+           rows_;
   }
-  fmt::print("{:<26} {:>10} {:>10} {:>11} {:>11}  {}\n", label, iterations, seconds,
-             trace.points.empty() ? "-" : fmt::format("{:.2e}", trace.points.back().position_error),
-             trace.points.size(), trace.ended);
-}
+
+private:
+  std::vector<Contestant> load_contestants(std::filesystem::path const& file) const {
+    return contestants(file, options_.scene.changes, methods_, options_.max_iterations);
+  }
+
+  void run(std::filesystem::path const& file) {
+    Scene const scene = load_scene(file, options_.scene.changes);
+    std::vector<Contestant> const all = load_contestants(file);
+    SceneGeometry const geometry = build_within_memory(scene);
+    header_ += header_.empty()
+                   ? "# kind = comparison\n" + describe(scene, geometry) + describe_target(options_)
+                   : fmt::format("# with = {}\n", scene.name);
+    std::vector<int> frames = options_.frames;
+    if (frames.empty()) frames = {std::min(10, scene.frames)};
+
+    std::vector<Contestant> alone;
+    SceneGeometry alone_geometry;
+    std::unique_ptr<Simulation> alone_reference;
+    if (options_.without_contact) {
+      for (Contestant const& one : all) alone.push_back({one.label, without_contact(one.scene)});
+      alone_geometry = build_within_memory(alone.front().scene);
+      alone_reference = Simulation::create(
+          without_contact(reference_scene(file, options_.scene.changes)), alone_geometry);
+    }
+    Reference reference(file, options_.scene.changes, geometry);
+    for (int frame : frames) {
+      ReferenceStep const step = reference.advance_to(frame);
+      compare(scene.name, scene, geometry, all, step);
+      if (!alone_reference) continue;
+      compare(scene.name + " without contact", alone.front().scene, alone_geometry, alone,
+              solve_reference(*alone_reference, step.before, frame));
+    }
+  }
+
+  void compare(std::string const& name, Scene const& scene, SceneGeometry const& geometry,
+               std::vector<Contestant> const& all, ReferenceStep const& step) {
+    StepMeasure const measure(scene, geometry, step.step, step.start, step.solution,
+                              options_.length);
+    describe_step(name, step, measure);
+    fmt::print(
+        "{} step {}: {} tets{}; errors relative to {:.4g} m; reference after {} iterations, "
+        "its last one moved {:.1e}\n",
+        name, step.step, geometry.mesh.tets.size(),
+        step.contact ? fmt::format(", {} pairs in contact", step.contact->contacts) : "",
+        measure.length(), step.iterations, step.last_move / measure.length());
+    fmt::print("{:<26} {:>10} {:>10} {:>11} {:>11} {:>11}  ended\n", "",
+               fmt::format("to {:g}", options_.target), "seconds", "frames/s", "last error",
+               "iterations");
+    for (Contestant const& one : all) {
+      auto const simulation = Simulation::create(one.scene, geometry);
+      Trace const found = trace(*simulation, step, measure,
+                                {options_.lowest, options_.max_seconds, options_.repetitions});
+      add_rows(fmt::format("{},{},{}", name, step.step, one.label), found);
+      say(one.label, found);
+    }
+  }
+
+  void describe_step(std::string const& name, ReferenceStep const& step,
+                     StepMeasure const& measure) {
+    bool const one_state = files_.size() == 1 && !options_.without_contact;
+    std::string const key = fmt::format("{}frame {}", one_state ? "" : name + " ", step.step);
+    header_ += fmt::format(
+        "# {0} length_m = {1:.6g}\n# {0} reference = newton fp64, {2} iterations, {3}\n"
+        "# {0} reference_last_move = {4:.3g}\n",
+        key, measure.length(), step.iterations, to_string(step.stop),
+        step.last_move / measure.length());
+    if (step.contact) {
+      header_ += fmt::format("# {0} contacts = {1}\n# {0} smallest_gap = {2:.3g}\n", key,
+                             step.contact->contacts, step.contact->smallest_gap);
+    }
+  }
+
+  void add_rows(std::string const& label, Trace const& trace) {
+    // A method that took no step at all still has a row to say so.
+    if (trace.points.empty()) rows_ += fmt::format("{},0,,,,{}\n", label, trace.ended);
+    for (std::size_t k = 0; k < trace.points.size(); ++k) {
+      TracePoint const& p = trace.points[k];
+      rows_ += fmt::format("{},{},{},{},{},{}\n", label, k + 1, field(p.seconds),
+                           field(p.position_error), field(p.energy_gap),
+                           k + 1 == trace.points.size() ? trace.ended : "");
+    }
+  }
+
+  void say(std::string const& label, Trace const& trace) const {
+    std::string iterations = "-", seconds = "-", rate = "-";
+    if (auto const k = trace.reached(options_.target)) {
+      double const s = trace.points[*k - 1].seconds;
+      iterations = std::to_string(*k);
+      seconds = fmt::format("{:.4g}", s);
+      rate = fmt::format("{:.3g}", 1 / s);
+    }
+    fmt::print(
+        "{:<26} {:>10} {:>10} {:>11} {:>11} {:>11}  {}\n", label, iterations, seconds, rate,
+        trace.points.empty() ? "-" : fmt::format("{:.2e}", trace.points.back().position_error),
+        trace.points.size(), trace.ended);
+  }
+
+  ChartOptions const& options_;
+  std::vector<ChartMethod> const& methods_;
+  std::vector<std::filesystem::path> files_;
+  std::string header_, rows_;
+};
 
 }  // namespace
 
 std::string compare_methods(std::filesystem::path const& file, ChartOptions const& options,
                             std::vector<ChartMethod> const& methods) {
-  Scene const scene = load_scene(file, options.scene.changes);
-  std::vector<Contestant> const all =
-      contestants(file, options.scene.changes, methods, options.max_iterations);
-  SceneGeometry const geometry = build_within_memory(scene);
-  std::vector<int> frames = options.frames;
-  if (frames.empty()) frames = {std::min(10, scene.frames)};
-
-  std::string header =
-      "# kind = comparison\n" + describe(scene, geometry) + describe_target(options);
-  std::string table = "frame,method,iteration,seconds,position_error,energy_gap,ended\n";
-  Reference reference(file, options.scene.changes, geometry);
-  for (int frame : frames) {
-    ReferenceStep const step = reference.advance_to(frame);
-    StepMeasure const measure(scene, geometry, frame, step.start, step.solution, options.length);
-    header += describe(step, measure);
-    fmt::print(
-        "{} step {}: {} tets; errors relative to {:.4g} m; reference after {} iterations, "
-        "its last one moved {:.1e}\n",
-        scene.name, frame, geometry.mesh.tets.size(), measure.length(), step.iterations,
-        step.last_move / measure.length());
-    fmt::print("{:<26} {:>10} {:>10} {:>11} {:>11}  ended\n", "",
-               fmt::format("to {:g}", options.target), "seconds", "last error", "iterations");
-    for (Contestant const& one : all) {
-      auto const simulation = Simulation::create(one.scene, geometry);
-      Trace const found = trace(*simulation, step, measure,
-                                {options.lowest, options.max_seconds, options.repetitions});
-      table += rows(frame, one.label, found);
-      say(one.label, found, options.target);
-    }
-  }
-  return header + table;
+  return Comparison(file, options, methods).run();
 }
 
 }  // namespace taut

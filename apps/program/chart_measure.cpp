@@ -6,6 +6,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 
 namespace taut {
 namespace {
@@ -34,7 +35,10 @@ double energy_scale(Scene const& scene, int step) {
 StepMeasure::StepMeasure(Scene const& scene, SceneGeometry const& geometry, int step,
                          std::vector<Point> const& before, std::vector<Point> solution,
                          std::optional<double> length)
-    : geometry_(geometry), solution_(std::move(solution)), scale_(energy_scale(scene, step)) {
+    : geometry_(geometry),
+      solution_(std::move(solution)),
+      scale_(energy_scale(scene, step)),
+      contact_(scene.contact.has_value()) {
   TetMesh const& mesh = geometry.mesh;
   std::vector<double> density;
   for (std::size_t t = 0; t < mesh.tets.size(); ++t) {
@@ -58,6 +62,10 @@ StepMeasure::StepMeasure(Scene const& scene, SceneGeometry const& geometry, int 
 
 double StepMeasure::position_error(std::vector<Point> const& x) const {
   return largest_distance(x, solution_) / length_;
+}
+
+double StepMeasure::energy_gap(std::vector<Point> const& x) const {
+  return contact_ ? std::numeric_limits<double>::quiet_NaN() : energy_above(x) / unit_energy_;
 }
 
 Mat3<double> StepMeasure::gradient(std::int32_t tet, std::vector<Point> const& x) const {

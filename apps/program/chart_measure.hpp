@@ -5,7 +5,8 @@
 //
 // evaluated in fp64 and independently of the methods under test. The gradient of E at x* is zero,
 // so forces and the inertial target drop out, and with them the cancellation of large numbers;
-// where x still moves prescribed vertices, the work of their reactions is left out.
+// where x still moves prescribed vertices, the work of their reactions is left out. With contact
+// there is more in E than this: errors are then those of position alone.
 #pragma once
 
 #include <taut/apps/program/scene_geometry.hpp>
@@ -29,9 +30,9 @@ public:
 
   /// max_i |x_i - x*_i| / length
   double position_error(std::vector<Point> const& x) const;
-  /// (E(x) - E(x*)) / (E(before) - E(x*)); NaN where E is not defined.
-  double energy_gap(std::vector<Point> const& x) const { return energy_above(x) / unit_energy_; }
-  /// E(x) - E(x*), kg m^2.
+  /// (E(x) - E(x*)) / (E(before) - E(x*)); NaN where E is not defined, and with contact.
+  double energy_gap(std::vector<Point> const& x) const;
+  /// E(x) - E(x*), kg m^2, without what contact adds to it.
   double energy_above(std::vector<Point> const& x) const;
 
 private:
@@ -50,6 +51,7 @@ private:
   std::vector<Part> parts_;
   double scale_ = 1;  ///< c h^2, s^2
   double length_ = 0, unit_energy_ = 1;
+  bool contact_ = false;
 };
 
 }  // namespace taut

@@ -31,8 +31,8 @@ std::string describe_target(ChartOptions const& options);
 /// A number as a field of a row: empty if it is not one.
 std::string field(double number);
 
-/// frame,method,iteration,seconds,position_error,energy_gap,ended: a row per iteration; the last
-/// row of a method says how it ended (see Trace).
+/// scene,frame,method,iteration,seconds,position_error,energy_gap,ended: a row per iteration; the
+/// last row of a method says how it ended (see Trace). Where there is contact energies are empty.
 std::string compare_methods(std::filesystem::path const& scene, ChartOptions const& options,
                             std::vector<ChartMethod> const& methods);
 
@@ -40,5 +40,17 @@ std::string compare_methods(std::filesystem::path const& scene, ChartOptions con
 /// what it took to bring the error to `target`; iterations and seconds are empty where that failed.
 std::string sweep_methods(std::filesystem::path const& scene, ChartOptions const& options,
                           std::vector<ChartMethod> const& methods);
+
+/// policy,steps,seconds_simulated,turns,inverted_seconds,inverted_turns,iterations,most_contacts,
+/// smallest_gap,seconds,ended,why: a row per policy, up to the last step that was clean: without an
+/// intersection, by the exact test, without an inverted element of a material that forbids it, and
+/// converged. `ended` says what came then: "intersects", "inverts", "not converged", "no step" (an
+/// error), "out of time" or "end of scene". Elements of other materials are inverted for the first
+/// time at `inverted_...`, empty if never. Turns are those of the pin that turns most.
+std::string stability_of_policies(std::filesystem::path const& scene, ChartOptions const& options);
+
+/// The same as JSON: `facts`, `rows` with null for what is empty and, of a comparison, what every
+/// method took to stay below the target: iterations, seconds, frames per second (in `methods`).
+std::string to_json(std::string const& table);
 
 }  // namespace taut

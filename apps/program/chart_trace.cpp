@@ -4,6 +4,7 @@
 #include <taut/core/report/timer.hpp>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <limits>
 
@@ -17,7 +18,7 @@ std::vector<std::string> const reference_solver{"solver.method=newton",
                                                 "solver.refresh=always",
                                                 "solver.stopping=decrement_window",
                                                 "solver.tolerance=1e-12",
-                                                "solver.max_iterations=200",
+                                                "solver.max_iterations=1000",
                                                 "solver.linear_tolerance=1e-3",
                                                 "solver.max_linear_iterations=100000"};
 
@@ -100,25 +101,40 @@ void take_time(Trace& trace, Simulation& simulation) {
 
 }  // namespace
 
+Scene reference_scene(std::filesystem::path const& scene, SceneChanges const& changes) {
+  return load_scene(scene, with(changes, reference_solver));
+}
+
 Reference::Reference(std::filesystem::path const& scene, SceneChanges const& changes,
                      SceneGeometry const& geometry)
-    : simulation_(
-          Simulation::create(load_scene(scene, with(changes, reference_solver)), geometry)) {}
+    : lead_(Simulation::create(
+          load_scene(scene, with(changes, std::array{std::string("solver.precision=fp64")})),
+          geometry)),
+      simulation_(Simulation::create(reference_scene(scene, changes), geometry)) {}
 
 ReferenceStep Reference::advance_to(int step) {
-  if (step <= simulation_->steps()) {
+  if (step <= last_) {
     throw Error("--frame {}: name frames from 1 on, each once, in ascending order", step);
   }
+  last_ = step;
+  while (lead_->steps() + 1 < step) lead_->step();
+  Checkpoint before;
+  lead_->save(before);
+  return solve_reference(*simulation_, before, step);
+}
+
+ReferenceStep solve_reference(Simulation& simulation, Checkpoint const& before, int step) {
   ReferenceStep result;
   result.step = step;
-  while (simulation_->steps() + 1 < step) simulation_->step();
-  simulation_->save(result.before);
-  result.start = simulation_->positions();
+  result.before = before;
+  simulation.restore(before);
+  result.start = simulation.positions();
 
   std::vector<Point> last = result.start, before_last = last;
-  NewtonReport const report = simulation_->step(
+  NewtonReport const report = simulation.step(
       [&](IterationView const& view) { before_last = std::exchange(last, view.positions()); });
-  result.solution = simulation_->positions();
+  result.solution = simulation.positions();
+  result.contact = simulation.contact();
   result.iterations = report.iterations;
   result.stop = report.stop;
   if (!report.converged() && report.stop != Stop::stalled) {

@@ -17,22 +17,32 @@ struct ReferenceStep {
   int iterations;
   Stop stop;
   double last_move;  ///< m, of the reference's last iteration: what it can tell apart
+  std::optional<ContactReport> contact;  ///< at the solution
 };
 
-/// The scene stepped by projected Newton in fp64 until no more can be gained.
+/// The scene brought to a step by its own solver in fp64, and that step solved by projected Newton
+/// in fp64 until no more can be gained.
 class Reference {
 public:
-  /// `changes` choose the scene, their solver's options apart. `geometry` is that of the scene.
+  /// `changes` choose the scene. `geometry` is that of the scene.
   Reference(std::filesystem::path const& scene, SceneChanges const& changes,
             SceneGeometry const& geometry);
 
-  /// Takes steps until number `step` is done. Throws Error if that is not ahead, or if the
-  /// reference itself does not converge.
+  /// Takes steps up to number `step` and solves that. Throws Error if it is not ahead of the last
+  /// one, or if the reference itself does not converge.
   ReferenceStep advance_to(int step);
 
 private:
-  std::unique_ptr<Simulation> simulation_;
+  std::unique_ptr<Simulation> lead_, simulation_;
+  int last_ = 0;
 };
+
+/// The scene with its solver replaced by that of the reference.
+Scene reference_scene(std::filesystem::path const& scene, SceneChanges const& changes);
+
+/// Solves step number `step` from the state `before` with the simulation of a reference_scene.
+/// Throws Error if that does not converge.
+ReferenceStep solve_reference(Simulation& simulation, Checkpoint const& before, int step);
 
 struct TracePoint {
   double seconds;         ///< from the beginning of the step, the fastest of all runs

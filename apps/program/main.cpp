@@ -144,18 +144,25 @@ int main(int argc, char** argv) {
   add_scene(*chart_app, chart.scene);
   add_list(*chart_app, "--methods", chart.methods, "NAME[:KEY=VALUE...], KEY of [solver]; all");
   add_list(*chart_app, "--frame", chart.frames, "time steps to compare, from 1");
+  add_list(*chart_app, "--with", chart.with, "other scenes in the same chart");
+  chart_app->add_flag("--without-contact", chart.without_contact,
+                      "also the same steps, from the same states, without contact");
   chart_app->add_flag("--sweep", chart.sweep, "time to --target against the scene's [sweep]");
+  chart_app->add_flag("--stability", chart.stability,
+                      "how far --policies bring the scene until a step is not clean");
+  add_list(*chart_app, "--policies", chart.policies,
+           "KEY=VALUE[:KEY=VALUE...], KEY of [contact] or TABLE.KEY; default, paper; all");
   chart_app->add_option("--target", chart.target, "error that counts as solved")
       ->capture_default_str();
   chart_app->add_option("--length", chart.length,
                         "m, what errors are relative to (the motion in the step)");
   chart_app->add_option("--iterations", chart.max_iterations, "at most")->capture_default_str();
-  chart_app->add_option("--seconds", chart.max_seconds, "per method, at most")
+  chart_app->add_option("--seconds", chart.max_seconds, "per method or policy, at most")
       ->capture_default_str();
   chart_app->add_option("--repetitions", chart.repetitions, "of timed runs")->capture_default_str();
   chart_app->add_option("--out", chart.out, "folder (charts/NAME)");
   chart_app->add_flag("--force", chart.force, "replaces a chart that is there");
-  chart_app->add_flag("--no-drawing", no_drawing, "data.csv alone");
+  chart_app->add_flag("--no-drawing", no_drawing, "data.csv and data.json alone");
   chart_app->footer("example: taut chart drag --methods dk,lbfgs,newton");
   chart_app->callback([&] {
     chart.draw = !no_drawing;

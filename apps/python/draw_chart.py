@@ -1,8 +1,10 @@
 """Draws the data of `taut chart`: draw_chart.py DATA.csv OUT writes OUT.svg and OUT.png.
 
-A comparison has a row of panels per frame and measure, over iterations and over seconds; a sweep
-has iterations and seconds over the swept value. Every curve is labelled at its end. A method that
-did not come below the target is a failure: it ends in a cross with the reason.
+A comparison has a row of panels per frame and measure, over iterations and over seconds, which are
+frames per second above; a sweep has iterations and seconds over the swept value. Every curve is
+labelled at its end. A method that did not come below the target is a failure: it ends in a cross
+with the reason. The stability of policies is a bar each, up to the last clean step, with what came
+then.
 """
 
 import csv
@@ -11,6 +13,7 @@ import re
 import sys
 
 import matplotlib
+import numpy as np
 
 matplotlib.use("Agg")
 import matplotlib.pyplot as plt
@@ -20,6 +23,7 @@ from matplotlib.ticker import LogLocator, NullFormatter
 # Okabe and Ito's colours, told apart by all kinds of colour vision; then again, dashed.
 COLOURS = ["#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#000000"]
 DASHES = ["solid", (0, (5, 1.5)), (0, (1, 1.2)), (0, (5, 1.5, 1, 1.5))]
+WORDS = ("scene", "method", "policy", "ended", "why")
 INK, PALE = "#333333", "#999999"
 HALO = [withStroke(linewidth=2.5, foreground="white")]
 
@@ -38,13 +42,16 @@ def read(path):
         for line in file:
             if line.startswith("# "):
                 name, _, value = line[2:].rstrip("\n").partition(" = ")
-                facts[name] = value
+                if name == "with":
+                    facts.setdefault(name, []).append(value)
+                else:
+                    facts[name] = value
             else:
                 table.append(line)
     rows = list(csv.DictReader(table))
     for row in rows:
         for name, value in row.items():
-            if name not in ("method", "ended"):
+            if name not in WORDS:
                 row[name] = float(value) if value else math.nan
     return facts, rows
 
@@ -137,20 +144,54 @@ def compare_panel(axes, rows, styles, abscissa, measure, target):
     return ends
 
 
+def name_curves(rows):
+    """A curve is called after what it does not share with the others: scene, method or both. Returns
+    the scenes."""
+    scenes = list(dict.fromkeys(row["scene"] for row in rows))
+    methods = {row["method"] for row in rows}
+    for row in rows:
+        if len(scenes) > 1:
+            one = row["scene"] if len(methods) == 1 else f"{row['scene']}, {row['method']}"
+            row["method"] = one.replace("_", " ")
+    return scenes
+
+
+def add_rates(axes):
+    """Frames per second, where a frame is this one step."""
+    above = axes.secondary_xaxis("top", functions=(inverse, inverse))
+    above.set_xlabel("frames per second")
+    above.tick_params(which="major", length=4, color=PALE)
+    above.tick_params(which="minor", length=2, color=PALE)
+
+
+def inverse(numbers):
+    with np.errstate(divide="ignore"):
+        return 1 / np.asarray(numbers, dtype=float)
+
+
 def draw_comparison(facts, rows):
     frames = sorted({row["frame"] for row in rows})
+    scenes = name_curves(rows)
     styles = methods_of(rows)
     target = float(facts["target"])
-    measures = [("position_error", "error of position"), ("energy_gap", "energy above the solution")]
-    figure, grid = plt.subplots(2 * len(frames), 2, figsize=(12, 8.2 * len(frames)), squeeze=False)
-    labels = []
+    measures = [("position_error", "error of position")]
+    # With contact there are no energies.
+    if all(math.isfinite(row["energy_gap"]) for row in rows if row["iteration"] == 1):
+        measures.append(("energy_gap", "energy above the solution"))
+    count = len(measures)
+    figure, grid = plt.subplots(count * len(frames), 2, squeeze=False,
+                                figsize=(12, (4.1 * count + 0.5) * len(frames)))
+    labels, rated = [], []
     for i, frame in enumerate(frames):
         mine = [row for row in rows if row["frame"] == frame]
-        scale = 1e3 * float(facts[f"frame {frame:.0f} length_m"])
-        resolved = float(facts[f"frame {frame:.0f} reference_last_move"])
+        keys = [f"frame {frame:.0f} "]
+        if f"frame {frame:.0f} length_m" not in facts:
+            keys = [f"{scene} frame {frame:.0f} " for scene in scenes]
+        scales = [1e3 * float(facts[key + "length_m"]) for key in keys]
+        resolved = max(float(facts[key + "reference_last_move"]) for key in keys)
         for j, (measure, title) in enumerate(measures):
             for k, abscissa in enumerate(("iteration", "seconds")):
-                axes = grid[2 * i + j][k]
+                axes = grid[count * i + j][k]
                 log_axes(axes)
                 labels.append((axes, compare_panel(axes, mine, styles, abscissa, measure, target)))
                 if measure == "position_error":
@@ -161,14 +202,21 @@ def draw_comparison(facts, rows):
                     axes.axhspan(limits[0] * 1e-9, resolved, color="#f0f0f0", zorder=0, lw=0)
                     axes.set_ylim(limits)
                 axes.set_xlabel("iterations" if abscissa == "iteration" else "seconds")
-            unit = f"1 = {scale:.3g} mm" if measure == "position_error" else "1 = at the step's start"
-            grid[2 * i + j][0].set_ylabel(f"{title}   ({unit})")
+                if abscissa == "seconds" and j == 0:
+                    rated.append(axes)
+            unit = "1 = at the step's start"
+            if measure == "position_error":
+                ends = dict.fromkeys(f"{scale:.3g}" for scale in (min(scales), max(scales)))
+                unit = f"1 = {' to '.join(ends)} mm"
+            grid[count * i + j][0].set_ylabel(f"{title}   ({unit})")
         missing = [f"{row['method']}: {row['ended']}" for row in mine if row["iteration"] == 0]
         subtitle = f"step {frame:.0f}"
+        if len(keys) == 1 and keys[0] + "contacts" in facts:
+            subtitle += f", {int(facts[keys[0] + 'contacts']):,} pairs in contact"
         if missing:
             subtitle += ";  no iteration at all: " + ", ".join(missing)
-        grid[2 * i][0].set_title(subtitle, loc="left", fontsize="medium", color="#666666")
-    return figure, labels
+        grid[count * i][0].set_title(subtitle, loc="left", fontsize="medium", color="#666666")
+    return figure, labels, rated
 
 
 def draw_sweep(facts, rows):
@@ -191,7 +239,7 @@ def draw_sweep(facts, rows):
         axes.set_xlabel(facts["key"])
         axes.set_ylabel(f"{measure} to an error of {target:.3g}")
         labels.append((axes, ends))
-    return figure, labels
+    return figure, labels, []
 
 
 def draw_failures(axes, failures):
@@ -215,25 +263,88 @@ def draw_failures(axes, failures):
     axes.set_ylim(low, high * step ** (len(methods) + 0.4))
 
 
+ENDINGS = {"end of scene": "#009E73", "out of time": "#999999", "intersects": "#D55E00",
+           "inverts": "#CC79A7", "not converged": "#E69F00", "no step": "#000000"}
+
+
+def draw_stability(facts, rows):
+    turns = float(facts["end_of_scene_turns"])
+    measure, end = ("turns", turns) if turns > 0 else ("seconds_simulated", float(facts["end_of_scene_s"]))
+    figure, axes = plt.subplots(figsize=(12, 1.6 + 0.34 * len(rows)))
+    inverted = []
+    for y, row in enumerate(rows):
+        colour = ENDINGS[row["ended"]]
+        axes.barh(y, row[measure], height=0.62, color=colour, alpha=0.85, lw=0)
+        if row["ended"] in ("end of scene", "out of time"):
+            marker = {"marker": ">", "ms": 7}
+        else:
+            marker = {"marker": "X", "ms": 9}
+        axes.plot(row[measure], y, color=colour, mec="white", mew=0.8, clip_on=False, zorder=5, **marker)
+        if row["inverted_" + measure.split("_")[0]] > 0:
+            inverted.append((row["inverted_" + measure.split("_")[0]], y))
+        text = row["ended"]
+        if row["ended"] == "end of scene":
+            text = "clean to the end"
+        elif row["why"] and row["ended"] != "no step":
+            text += f": {row['why']}"
+        rate = f"{row['iterations']:.0f} iterations per step" if row["steps"] > 0 else "no clean step"
+        axes.annotate(f"{text}   ({rate})", (row[measure], y), xytext=(9, 0), va="center",
+                      textcoords="offset points", fontsize="small", annotation_clip=False,
+                      path_effects=HALO)
+    if inverted:
+        axes.plot(*zip(*inverted), ls="none", marker="|", ms=13, mew=1.6, color=INK, zorder=4,
+                  label="elements are inverted from here on")
+        axes.legend(loc="lower left", bbox_to_anchor=(0, 1), frameon=False, fontsize="small")
+    axes.set_yticks(range(len(rows)), [row["policy"] for row in rows])
+    axes.invert_yaxis()
+    axes.set_xlim(0, end)
+    axes.grid(axis="y", visible=False)
+    axes.axvline(end, color=PALE, lw=0.8, ls=(0, (4, 3)), zorder=1)
+    axes.set_xlabel("turns of the pin that turns most, up to the last clean step" if turns > 0
+                    else "seconds simulated, up to the last clean step")
+    return figure, [], []
+
+
+def describe(facts):
+    text = "" if "with" in facts else f"{int(facts['tets']):,} tets, "
+    text += (f"{facts['materials']}, {facts['integrator']} with {facts['step_s']} s, "
+             f"{facts['threads']} thread{'' if facts['threads'] == '1' else 's'}.  ")
+    if facts["kind"] == "stability":
+        return text + "Clean: converged and without an intersection, after every step"
+    text += "Errors against projected Newton in fp64"
+    if facts["length"] == "motion":
+        text += ", in units of the motion in the step"
+        if facts["kind"] == "sweep":
+            text += " at the first value"
+    return text
+
+
 def main():
     data, out = sys.argv[1:3]
     facts, rows = read(data)
-    draw = draw_sweep if facts["kind"] == "sweep" else draw_comparison
-    figure, labels = draw(facts, rows)
+    draw = {"sweep": draw_sweep, "comparison": draw_comparison, "stability": draw_stability}[facts["kind"]]
+    figure, labels, rated = draw(facts, rows)
     inches = figure.get_size_inches()[1]
     figure.subplots_adjust(left=0.065, right=0.86, wspace=0.5, hspace=0.24, bottom=0.55 / inches,
                            top=1 - 0.95 / inches)
-    facts = {name: re.sub(r"e\+0?", "e", value) for name, value in facts.items()}
-    figure.text(0.02, 1 - 0.12 / inches, facts["scene"], va="top", fontsize=13, fontweight="bold")
+    longest = max((len(row.get("method", "")) for row in rows), default=0)
+    if longest > 22:  # room for their names
+        figure.set_size_inches(12 + 0.13 * (longest - 22), inches)
+        figure.subplots_adjust(right=0.82, wspace=0.65)
+    if rated:
+        figure.subplots_adjust(hspace=0.3, top=1 - 1.15 / inches)
+    if facts["kind"] == "stability":
+        figure.subplots_adjust(left=0.22, right=0.7)
+    for name in facts.keys() - {"with"}:
+        facts[name] = re.sub(r"e\+0?", "e", facts[name])
+    title = ", ".join([facts["scene"], *facts.get("with", [])])
+    figure.text(0.02, 1 - 0.12 / inches, title, va="top", fontsize=13, fontweight="bold")
     if facts["kind"] == "sweep":  # what is swept is on the axis
         facts["materials"] = re.sub(r" \(.*?\)", "", facts["materials"])
         facts["integrator"] = f"step {facts['frame']} of {facts['integrator']}"
-    figure.text(0.02, 1 - 0.40 / inches, f"{int(facts['tets']):,} tets, {facts['materials']}, "
-                f"{facts['integrator']} with {facts['step_s']} s, {facts['threads']} thread"
-                f"{'' if facts['threads'] == '1' else 's'}.  Errors against projected Newton in fp64"
-                f"{', in units of the motion in the step' if facts['length'] == 'motion' else ''}"
-                f"{' at the first value' if facts['kind'] == 'sweep' and facts['length'] == 'motion' else ''}",
-                va="top", color="#666666")
+    figure.text(0.02, 1 - 0.40 / inches, describe(facts), va="top", color="#666666")
+    for axes in rated:
+        add_rates(axes)
     figure.canvas.draw()  # fixes the limits that labels are placed by
     for axes, ends in labels:
         label_ends(axes, ends)

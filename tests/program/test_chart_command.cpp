@@ -1,88 +1,17 @@
 // `taut chart` from scene to data.csv.
-#include <taut/apps/program/chart.hpp>
 #include <taut/apps/program/chart_method.hpp>
 #include <taut/apps/program/methods.hpp>
-#include <taut/core/io/file.hpp>
 
 #include <catch2/catch_test_macros.hpp>
 #include <catch2/matchers/catch_matchers_exception.hpp>
 #include <catch2/matchers/catch_matchers_string.hpp>
 
-#include <cmath>
-#include <map>
-#include <sstream>
-
-#include "scene_text.hpp"
+#include "chart_data.hpp"
 
 using namespace taut;
+using namespace taut::test;
 using Catch::Matchers::ContainsSubstring;
 using Catch::Matchers::MessageMatches;
-
-namespace {
-
-using Row = std::map<std::string, std::string>;
-
-std::vector<std::string> split(std::string const& line) {
-  std::vector<std::string> fields(1);
-  for (char c : line) {
-    if (c == ',') {
-      fields.emplace_back();
-    } else {
-      fields.back() += c;
-    }
-  }
-  return fields;
-}
-
-struct Data {
-  std::string header;
-  std::vector<Row> rows;
-  std::vector<Row> of(std::string const& method) const {
-    std::vector<Row> mine;
-    for (Row const& row : rows)
-      if (row.at("method") == method) mine.push_back(row);
-    return mine;
-  }
-};
-
-Data read_data(std::filesystem::path const& file) {
-  Data data;
-  std::istringstream text(read_file(file));
-  std::vector<std::string> names;
-  for (std::string line; std::getline(text, line);) {
-    if (line.starts_with("# ")) {
-      data.header += line + "\n";
-    } else if (names.empty()) {
-      names = split(line);
-    } else {
-      std::vector<std::string> const fields = split(line);
-      REQUIRE(fields.size() == names.size());
-      Row row;
-      for (std::size_t i = 0; i < names.size(); ++i) row[names[i]] = fields[i];
-      data.rows.push_back(row);
-    }
-  }
-  return data;
-}
-
-double number(Row const& row, std::string const& name) { return std::stod(row.at(name)); }
-
-ChartOptions options_for(test::ScratchFolder const& folder, std::string const& scene) {
-  ChartOptions options;
-  options.scene.scene = folder.write("scene.toml", scene).string();
-  options.out = std::filesystem::path(options.scene.scene).parent_path() / "chart";
-  options.frames = {2};
-  options.repetitions = 1;
-  options.draw = false;
-  return options;
-}
-
-Data chart(ChartOptions const& options) {
-  REQUIRE(chart_command(options) == 0);
-  return read_data(options.out / "data.csv");
-}
-
-}  // namespace
 
 TEST_CASE("methods meet at the solution of the reference", "[chart]") {
   test::ScratchFolder const folder;
