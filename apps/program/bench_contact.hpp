@@ -20,7 +20,7 @@
 namespace taut {
 
 struct ContactBenchOptions {
-  std::vector<std::string> precisions{"mixed", "fp64"};        ///< of mixed, fp64: fp32 places cost the same
+  std::vector<std::string> precisions{"mixed", "fp64"};        ///< of mixed, fp64
   std::vector<int> contacts{1'000, 10'000, 100'000, 300'000};  ///< about so many
   std::vector<int> threads;                                    ///< empty: one, and all
   int iterations = 30;                                         ///< of a step
