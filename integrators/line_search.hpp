@@ -59,8 +59,10 @@ public:
     return form_;
   }
   double known_curvature() const { return form_; }
-  /// The step of the quadratic model, -g'p / p'Hp; infinity where no curvature is left along p.
+  /// The step of the quadratic model, -g'p / p'Hp; infinity where no curvature is left along p, 0
+  /// where nothing is to be gained.
   double newton_length() {
+    if (slope_ == 0) return 0;
     if (curvature() > 0) return -slope_ / curvature();
     double const infinity = std::numeric_limits<double>::infinity();
     return slope_ > 0 ? -infinity : infinity;

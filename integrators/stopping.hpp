@@ -222,8 +222,10 @@ public:
   Stop check(Progress const& progress) {
     add(progress);
     if (steps_++ == 0) first_ = progress.decrement;
-    bool const reached =
-        steps_ > params_.min_iterations && progress.decrement < params_.tolerance * first_;
+    // What round-off makes of a minimum is no energy to lose: a free fall begins at its end.
+    double const noise = 0.5 * scale_.mass * floor_ * floor_;
+    bool const reached = params_.tolerance > 0 && steps_ > params_.min_iterations &&
+                         progress.decrement <= std::max(params_.tolerance * first_, noise);
     return reached ? Stop::converged_by_energy_drop : Stop::none;
   }
 

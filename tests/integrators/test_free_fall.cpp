@@ -39,3 +39,19 @@ TEMPLATE_TEST_CASE("a free fall takes one window of iterations and no backtracki
     }
   CHECK(furthest < 10 * 4 * 10 * double(Kokkos::Experimental::epsilon_v<typename P::real>));
 }
+
+TEST_CASE("the paper's rules end a free fall, where neither a gradient nor a direction is left",
+          "") {
+  Body<> const body(make_shape(BoxShape{{0.4, 0.4, 0.4}}, 2), 1000);
+  Potential scene(body.unknowns, Inertia(body.unknowns), BodyForce(body.unknowns, {0, -10, 0}),
+                  ElasticTets<Elastic<StableNeoHookean>>(body.rest, lame_parameters(3e5, 0.4)));
+  using Paper = Ncg<DaiKou, Jacobi, NewtonStep, EnergyDrop>;
+  ImplicitEuler<Paper> stepper(Paper::Params{.safeguard = {.on = false}});
+  State<> state(body.positions());
+  for (int n = 1; n <= 3; ++n) {
+    auto const report = stepper.step(scene, state, 0.01);
+    CAPTURE(n, to_string(report.stop), report.iterations);
+    CHECK(report.converged());
+    CHECK(report.iterations <= 4);
+  }
+}
