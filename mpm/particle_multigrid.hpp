@@ -1,8 +1,8 @@
 // The multigrid cycle as a preconditioner of any minimiser over particles, made from these at once:
 // by default without a fine matrix, whose level is smoothed by Chebyshev's polynomial on products
-// with 45 numbers per particle and patches where cells are cut (cut_cells.hpp), above coarser
-// levels in float that are assembled from the particles and smoothed by Gauss-Seidel. `assembled`:
-// with the fine matrix, as HOT has it (Wang et al. 2020).
+// with 45 numbers per particle (and patches where cells are cut, if asked for: cut_cells.hpp),
+// above coarser levels in float that are assembled from the particles and smoothed by Gauss-Seidel.
+// `assembled`: with the fine matrix, as HOT has it (Wang et al. 2020).
 //
 // For potentials in which one term holds all particles, and others act on single nodes; where more
 // is coupled GridMultigrid takes the Hessian that the potential assembles.
