@@ -79,7 +79,7 @@ using ParticlePotential = Potential<Inertia<ParticlePrecision>, BodyForce<Partic
 
 /// What ParticleBlocks are to be padded to for them.
 int particle_lanes();
-/// Adds the elastic term of a model. Throws Error for one that is not compiled.
+/// Adds the elastic term of a model (particle_models).
 void add_particle_term(ParticleTerms& terms, std::string_view model,
                        std::vector<Lame<double>> const& materials);
 

@@ -86,15 +86,8 @@ shape = { kind = "half_space" }
 contact = "separate"
 )";
 
-std::string spoilt(std::string const& old, std::string const& by) {
-  std::string text = plain;
-  auto const at = text.find(old);
-  REQUIRE(at != std::string::npos);
-  return text.replace(at, old.size(), by);
-}
-
 void refused(std::string const& old, std::string const& by, std::string const& sentence) {
-  SceneRun const run("cube.toml", spoilt(old, by));
+  SceneRun const run("cube.toml", replaced(plain, old, by));
   CHECK_THROWS_MATCHES(run_command(run.options), Error,
                        MessageMatches(ContainsSubstring(sentence)));
 }
@@ -216,6 +209,30 @@ TEST_CASE("all methods find the same step", "[particles]") {
   CHECK(worst < 1e-5 * 0.1);
 }
 
+TEST_CASE("every model takes the steps of a cube that is spun out of shape", "[particles]") {
+  // Different ones, but at strains of a few per cent not by much.
+  auto const after = [](std::string_view model) {
+    std::string const spun =
+        replaced(plain, "material = {",
+                 "velocity = { axis = [0, 1, 0], angular_velocity = 900 }\nmaterial = {");
+    SceneRun const run("cube.toml", replaced(spun, "young = 1e5",
+                                             fmt::format("model = \"{}\", young = 1e5", model)));
+    Scene const scene = run.scene();
+    auto const simulation = ParticleSimulation::create(scene, build_particles(scene));
+    for (int n = 0; n < 3; ++n) CHECK(simulation->step().converged());
+    return simulation->positions();
+  };
+  auto const reference = after(particle_models().front());
+  for (std::string_view model : particle_models().subspan(1)) {
+    CAPTURE(model);
+    auto const x = after(model);
+    double apart = 0;
+    for (std::size_t p = 0; p < x.size(); ++p) apart = std::max(apart, norm(x[p] - reference[p]));
+    CHECK(apart > 1e-6);
+    CHECK(apart < 0.02);
+  }
+}
+
 TEST_CASE("mistakes in a scene of material points are answered by a sentence", "[particles]") {
   refused("spacing = 0.1", "spacing = 0", "grid.spacing is 0: it must be");
   refused("spacing = 0.1", "spacing = 0.5",
@@ -225,7 +242,7 @@ TEST_CASE("mistakes in a scene of material points are answered by a sentence", "
   refused("step = 0.01", "step = 0", "time.step is 0");
   refused("kind = \"box\"", "kind = \"bowl\"", "object.cube.shape.kind is 'bowl'");
   refused("[0.4, 0.4, 0.4]", "[0.4, 0.4, 0.4], resolution = 3", "grid.spacing");
-  refused("young = 1e5", "model = \"arap\", young = 1e5", "object.cube.material.model is 'arap'");
+  refused("young = 1e5", "model = \"jelly\", young = 1e5", "object.cube.material.model is 'jelly'");
   refused("young = 1e5", "plasticity = { kind = \"clay\" }, young = 1e5", "is 'clay'");
   refused("young = 1e5", "plasticity = { kind = \"von_mises\" }, young = 1e5", "yield_stress");
   refused("translate = [0, 0.2, 0]", "translate = [0, 0.1, 0]",
