@@ -341,13 +341,13 @@ TEST_CASE("tets and triangles are cells of one grid, the tets first") {
               ">0 1 8<", "<DataItem Dimensions=\"17\"", ">0 1 2<", "<DataItem Dimensions=\"5\""});
 }
 
-TEST_CASE("cells that are not tets with triangles behind them are no result") {
+TEST_CASE("cells in another order than particles, tets and triangles are no result") {
   const Folder folder;
   const auto path = folder / "result.vtkhdf";
   ResultWriter::create(path, mixed_sample(), 2, ResultWriter::IfExists::refuse);
   const auto [name, at, value, reason] = GENERATE(table<char const*, int, int, char const*>(
-      {{"VTKHDF/Types", 0, 5, "not tets with triangles behind them"},
-       {"VTKHDF/Types", 4, 12, "not tets with triangles behind them"},
+      {{"VTKHDF/Types", 0, 5, "not particles, tets and triangles, in this order"},
+       {"VTKHDF/Types", 4, 12, "not particles, tets and triangles, in this order"},
        {"VTKHDF/Types", 2, 10, "not those of its points"},
        {"VTKHDF/CellData/object", 4, 4, "objects that do not exist"},
        {"VTKHDF/Connectivity", 16, 5, "not those of its points"},
