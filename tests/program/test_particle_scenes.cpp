@@ -149,7 +149,8 @@ TEST_CASE("two disks meet, bounce and keep their momentum", "[particles][truth]"
   std::int64_t const last = result.frames() - 1;
   Point const before = momentum(0, 0) + momentum(0, 1),
               after = momentum(last, 0) + momentum(last, 1);
-  for (std::size_t c : {0u, 2u}) CHECK_THAT(after[c], WithinAbs(before[c], 1e-6));
+  // To what the tolerance of a step leaves, summed over 160 of them.
+  for (std::size_t c : {0u, 2u}) CHECK_THAT(after[c], WithinAbs(before[c], 1e-5));
   double least = energy(0);
   for (std::int64_t frame = 0; frame <= last; ++frame) least = std::min(least, energy(frame));
   CHECK(least < 0.5 * energy(0));     // it has become strain
