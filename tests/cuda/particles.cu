@@ -4,6 +4,7 @@
 #include <taut/integrators/time_stepper.hpp>
 #include <taut/materials/models.hpp>
 #include <taut/mpm/elastic_particles.hpp>
+#include <taut/mpm/particle_multigrid.hpp>
 #include <taut/mpm/particle_stepper.hpp>
 #include <taut/mpm/slip.hpp>
 
@@ -17,3 +18,8 @@ template class taut::Slip<>;
 using Stepper = ParticleStepper<ImplicitEuler<Ncg<DaiKou, BlockJacobi>>>;
 template auto Stepper::step(Potential<Inertia<>, Points>&, Stepper::Grid&, Particles<Mixed> const&,
                             double);
+
+using Projected = ElasticParticles<Elastic<FixedCorotated, FullProjection>>;
+template class taut::ParticleMultigrid<>;
+template void ParticleMultigrid<>::update(Potential<Inertia<>, Projected, Slip<>>&,
+                                          VectorField<double, DefaultSpace> const&);
