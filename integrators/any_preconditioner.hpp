@@ -2,12 +2,12 @@
 #pragma once
 
 #include <taut/core/report/error.hpp>
+#include <taut/integrators/one_of.hpp>
 #include <taut/integrators/preconditioner.hpp>
 #include <taut/integrators/schwarz.hpp>
 
 #include <string>
 #include <string_view>
-#include <variant>
 
 namespace taut {
 
@@ -30,7 +30,7 @@ public:
   }
 
   OneOfPreconditioners() : OneOfPreconditioners(Params()) {}
-  explicit OneOfPreconditioners(Params const& params) : chosen_(make(params)) {}
+  explicit OneOfPreconditioners(Params const& params) : chosen_(make_one_of<Ms...>(params)) {}
 
   Refresh refresh() const {
     return std::visit([](auto const& m) { return m.refresh(); }, chosen_);
@@ -54,18 +54,7 @@ public:
   }
 
 private:
-  using Chosen = std::variant<Ms...>;
-
-  static Chosen make(Params const& params) {
-    Chosen made;
-    ((std::holds_alternative<typename Ms::Params>(params)
-          ? void(made = Ms(std::get<typename Ms::Params>(params)))
-          : void()),
-     ...);
-    return made;
-  }
-
-  Chosen chosen_;
+  std::variant<Ms...> chosen_;
 };
 
 /// Those that need to know nothing but the unknowns; block Jacobi by default.

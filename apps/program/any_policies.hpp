@@ -3,6 +3,7 @@
 #pragma once
 
 #include <taut/integrators/line_search.hpp>
+#include <taut/integrators/one_of.hpp>
 #include <taut/integrators/stopping.hpp>
 
 #include <variant>
@@ -14,16 +15,9 @@ public:
   using Params =
       std::variant<SufficientDecrease::Params, NewtonStep::Params, ExactLineSearch::Params>;
 
-  AnyLineSearch() = default;
-  explicit AnyLineSearch(Params const& params) {
-    if (auto const* newton = std::get_if<NewtonStep::Params>(&params)) {
-      search_ = NewtonStep(*newton);
-    } else if (auto const* exact = std::get_if<ExactLineSearch::Params>(&params)) {
-      search_ = ExactLineSearch(*exact);
-    } else {
-      search_ = SufficientDecrease(std::get<SufficientDecrease::Params>(params));
-    }
-  }
+  AnyLineSearch() : AnyLineSearch(Params()) {}
+  explicit AnyLineSearch(Params const& params)
+      : search_(make_one_of<SufficientDecrease, NewtonStep, ExactLineSearch>(params)) {}
 
   template <class E>
   Step operator()(Line<E>& line, double first) const {
@@ -34,20 +28,14 @@ private:
   std::variant<SufficientDecrease, NewtonStep, ExactLineSearch> search_;
 };
 
-class AnyStopping {
+/// One of `Rules`.
+template <class... Rules>
+class OneOfStoppings {
 public:
-  using Params = std::variant<DecrementWindow::Params, EnergyDrop::Params, GradientNorm::Params>;
+  using Params = std::variant<typename Rules::Params...>;
 
-  AnyStopping() = default;
-  explicit AnyStopping(Params const& params) {
-    if (auto const* drop = std::get_if<EnergyDrop::Params>(&params)) {
-      rule_ = EnergyDrop(*drop);
-    } else if (auto const* norm = std::get_if<GradientNorm::Params>(&params)) {
-      rule_ = GradientNorm(*norm);
-    } else {
-      rule_ = DecrementWindow(std::get<DecrementWindow::Params>(params));
-    }
-  }
+  OneOfStoppings() : OneOfStoppings(Params()) {}
+  explicit OneOfStoppings(Params const& params) : rule_(make_one_of<Rules...>(params)) {}
 
   void start(Scale const& scale) {
     std::visit([&](auto& rule) { rule.start(scale); }, rule_);
@@ -65,8 +53,10 @@ public:
     return std::visit([](auto const& rule) { return rule.negligible(); }, rule_);
   }
 
-private:
-  std::variant<DecrementWindow, EnergyDrop, GradientNorm> rule_;
+protected:
+  std::variant<Rules...> rule_;
 };
+
+using AnyStopping = OneOfStoppings<DecrementWindow, EnergyDrop, GradientNorm>;
 
 }  // namespace taut

@@ -19,18 +19,6 @@ Json value_of(std::string const& text) {
   return number;
 }
 
-std::vector<std::string> split(std::string const& line) {
-  std::vector<std::string> fields(1);
-  for (char c : line) {
-    if (c == ',') {
-      fields.emplace_back();
-    } else {
-      fields.back() += c;
-    }
-  }
-  return fields;
-}
-
 /// Of rows first to last (excluded), which are the iterations of one method.
 Json summary(Json const& rows, std::size_t first, std::size_t last, double target) {
   Json result;
@@ -54,6 +42,18 @@ Json summary(Json const& rows, std::size_t first, std::size_t last, double targe
 
 }  // namespace
 
+std::vector<std::string> split_row(std::string const& line) {
+  std::vector<std::string> fields(1);
+  for (char c : line) {
+    if (c == ',') {
+      fields.emplace_back();
+    } else {
+      fields.back() += c;
+    }
+  }
+  return fields;
+}
+
 std::string to_json(std::string const& table) {
   Json facts = Json::object(), rows = Json::array();
   std::istringstream text(table);
@@ -69,9 +69,9 @@ std::string to_json(std::string const& table) {
         facts[name] = value;
       }
     } else if (names.empty()) {
-      names = split(line);
+      names = split_row(line);
     } else {
-      std::vector<std::string> const fields = split(line);
+      std::vector<std::string> const fields = split_row(line);
       Json row;
       for (std::size_t i = 0; i < names.size(); ++i) row[names[i]] = value_of(fields[i]);
       rows.push_back(row);

@@ -49,6 +49,9 @@ std::string sweep_methods(std::filesystem::path const& scene, ChartOptions const
 /// time at `inverted_...`, empty if never. Turns are those of the pin that turns most.
 std::string stability_of_policies(std::filesystem::path const& scene, ChartOptions const& options);
 
+/// The fields of a row.
+std::vector<std::string> split_row(std::string const& line);
+
 /// The same as JSON: `facts`, `rows` with null for what is empty and, of a comparison, what every
 /// method took to stay below the target: iterations, seconds, frames per second (in `methods`).
 std::string to_json(std::string const& table);

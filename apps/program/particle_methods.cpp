@@ -9,7 +9,6 @@
 #include <taut/mpm/particle_multigrid.hpp>
 
 #include <array>
-#include <variant>
 
 namespace taut {
 namespace {
@@ -41,49 +40,20 @@ public:
 };
 
 /// Those of meshes, and HOT's.
-class ParticleStopping {
+class ParticleStopping : public OneOfStoppings<AnyStopping, CharacteristicNorm<S>> {
 public:
-  using Params = std::variant<AnyStopping::Params, CharacteristicNorm<S>::Params>;
-
-  ParticleStopping() = default;
-  explicit ParticleStopping(Params const& params) {
-    if (auto const* norm = std::get_if<CharacteristicNorm<S>::Params>(&params)) {
-      rule_ = CharacteristicNorm<S>(*norm);
-    } else {
-      rule_ = AnyStopping(std::get<AnyStopping::Params>(params));
-    }
-  }
-  void start(Scale const& scale) {
-    std::visit([&](auto& rule) { rule.start(scale); }, rule_);
-  }
-  Stop check(Progress const& progress) {
-    return std::visit([&](auto& rule) { return rule.check(progress); }, rule_);
-  }
+  using OneOfStoppings::OneOfStoppings;
   Stop judge(ParticlePotential& e, VectorField<P::real, S> const& g) {
     auto* const norm = std::get_if<CharacteristicNorm<S>>(&rule_);
     return norm != nullptr ? norm->judge(e, g) : Stop::none;
   }
-  void forget() {
-    std::visit([](auto& rule) { rule.forget(); }, rule_);
-  }
-  double error_estimate() const {
-    return std::visit([](auto const& rule) { return rule.error_estimate(); }, rule_);
-  }
-  double negligible() const {
-    return std::visit([](auto const& rule) { return rule.negligible(); }, rule_);
-  }
-
-private:
-  std::variant<AnyStopping, CharacteristicNorm<S>> rule_;
 };
 
 class AnyForcing {
 public:
   using Params = std::variant<ForcingTerm::Params, RootForcing::Params>;
   explicit AnyForcing(Params const& params)
-      : rule_(std::holds_alternative<RootForcing::Params>(params)
-                  ? Rule(RootForcing(std::get<RootForcing::Params>(params)))
-                  : Rule(ForcingTerm(std::get<ForcingTerm::Params>(params)))) {}
+      : rule_(make_one_of<ForcingTerm, RootForcing>(params)) {}
   void start(ParticlePotential& e) {
     std::visit([&](auto& rule) { rule.start(e); }, rule_);
   }
@@ -95,8 +65,7 @@ public:
   }
 
 private:
-  using Rule = std::variant<ForcingTerm, RootForcing>;
-  Rule rule_;
+  std::variant<ForcingTerm, RootForcing> rule_;
 };
 
 template <class Minimiser>

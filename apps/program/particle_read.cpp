@@ -14,7 +14,8 @@ constexpr std::array<std::string_view, 5> kinds{
     "none", VonMises::name, VonMisesFixedCorotated::name, SnowClamp::name, DruckerPrager::name};
 
 /// In the frame of its owner; what has a mesh elsewhere has none here, and no resolution.
-Shape read_solid(Section const& s, double scale, std::vector<std::string_view> extra = {}) {
+Shape read_shape_without_mesh(Section const& s, double scale,
+                              std::vector<std::string_view> keys = {}) {
   std::vector<std::string_view> const shapes{"box",      "beam", "sheet", "sphere",
                                              "cylinder", "rod",  "torus"};
   if (s.find("resolution"))
@@ -22,50 +23,13 @@ Shape read_solid(Section const& s, double scale, std::vector<std::string_view> e
         "{}: {}.resolution: material points have that of the grid (grid.spacing): leave "
         "the key out",
         s.at("resolution").place, s.path());
-  std::string const kind = s.choice("kind", shapes);
-  auto const allow = [&](std::vector<std::string_view> keys) {
-    keys.push_back("kind");
-    keys.insert(keys.end(), extra.begin(), extra.end());
-    s.allow(keys);
-  };
-  auto const length = [&](std::string_view key) { return scale * s.number(key, length_range); };
-  if (kind == "box") {
-    allow({"size"});
-    Point size = s.point("size", "m");
-    for (double& edge : size) {
-      if (!length_range.contains(edge))
-        throw Error("{}: {} has an edge of {} m: it must be {}", s.at("size").place, s.path("size"),
-                    edge, length_range.describe());
-      edge *= scale;
-    }
-    return BoxShape{size};
-  }
-  if (kind == "beam") {
-    allow({"length", "height", "width"});
-    return BoxShape{{length("length"), length("height"), length("width")}};
-  }
-  if (kind == "sheet") {
-    allow({"length", "width", "thickness"});
-    return BoxShape{{length("length"), length("thickness"), length("width")}};
-  }
-  if (kind == "sphere") {
-    allow({"radius"});
-    return SphereShape{length("radius")};
-  }
-  if (kind == "cylinder") {
-    allow({"radius", "height"});
-    return CylinderShape{length("radius"), length("height"), 1};
-  }
-  if (kind == "rod") {
-    allow({"radius", "length"});
-    return CylinderShape{length("radius"), length("length"), 0};
-  }
-  allow({"radius", "tube_radius"});
-  TorusShape const torus{length("radius"), length("tube_radius")};
-  if (!(torus.tube_radius < torus.radius))
+  keys.insert(keys.begin(), "kind");
+  Shape const shape = *read_solid(s, s.choice("kind", shapes), keys, scale);
+  auto const* torus = std::get_if<TorusShape>(&shape);
+  if (torus && !(torus->tube_radius < torus->radius))
     throw Error("{}: {}.tube_radius is {} m: it must be below the radius, {} m",
-                s.at("tube_radius").place, s.path(), torus.tube_radius, torus.radius);
-  return torus;
+                s.at("tube_radius").place, s.path(), torus->tube_radius, torus->radius);
+  return shape;
 }
 
 Plasticity read_plasticity(Section const& s) {
@@ -148,7 +112,7 @@ std::vector<SceneBody> read_body(Section const& s, Scene const& scene, double pe
   body.scale = read_scale(s);
   body.placement = read_placement(s);
   if (has_shape(s)) {
-    body.geometry = read_solid(*s.section("shape"), 1);
+    body.geometry = read_shape_without_mesh(*s.section("shape"), 1);
   } else {
     body.geometry = read_file_name(s, scene);
   }
@@ -160,16 +124,7 @@ std::vector<SceneBody> read_body(Section const& s, Scene const& scene, double pe
     for (SceneValue const& name : read_list(*names, s.path("without")))
       body.without.push_back(read_text(name, s.path("without")));
   if (auto const start = s.section("start")) body.start = read_start(*start);
-  Copies const copies = read_copies(s);
-  std::vector<SceneBody> block;
-  for (Point const& way : copies.ways) {
-    SceneBody copy = body;
-    if (copies.named) copy.name = fmt::format("{}-{}", body.name, block.size());
-    copy.placement.translation = copy.placement.translation + way;
-    copy.velocity.centre = copy.velocity.centre + way;
-    block.push_back(std::move(copy));
-  }
-  return block;
+  return copies_of(body, s);
 }
 
 SceneBoundary read_boundary(Section const& s) {
@@ -189,7 +144,7 @@ SceneBoundary read_boundary(Section const& s) {
                                     shape.direction("normal", HalfSpaceShape{}.normal)};
   } else {
     boundary.inside = shape.flag("inside", false);
-    boundary.shape = read_solid(shape, scale, {"inside"});
+    boundary.shape = read_shape_without_mesh(shape, scale, {"inside"});
   }
   boundary.motion = read_motion(s);
   if (s.find("release")) {

@@ -4,6 +4,8 @@
 #include <taut/apps/program/scene.hpp>
 #include <taut/apps/program/scene_value.hpp>
 
+#include <fmt/format.h>
+
 namespace taut {
 
 inline constexpr double unbounded = std::numeric_limits<double>::infinity();
@@ -22,6 +24,10 @@ enum class ShapeOf { object, obstacle };
 /// Whether an object or obstacle has a shape; else it has a mesh. Throws Error for both and
 /// neither.
 bool has_shape(Section const& section);
+/// A shape that meshes and material points share, its lengths times `scale`; nothing for another
+/// `kind`. `common`: the keys that the table may have besides those of the kind.
+std::optional<Shape> read_solid(Section const& shape, std::string_view kind,
+                                std::vector<std::string_view> const& common, double scale = 1);
 /// The table `shape`; `factor` is of its resolution.
 ProceduralShape read_shape(Section const& shape, double factor, ShapeOf owner);
 /// The keys `scale`, `rotate` and `translate`.
@@ -44,6 +50,20 @@ struct Copies {
   bool named = false;
 };
 Copies read_copies(Section const& object);
+/// The object at each of them. The centre of its velocity moves along.
+template <class Object>
+std::vector<Object> copies_of(Object const& object, Section const& section) {
+  Copies const copies = read_copies(section);
+  std::vector<Object> block;
+  for (Point const& way : copies.ways) {
+    Object copy = object;
+    if (copies.named) copy.name = fmt::format("{}-{}", object.name, block.size());
+    copy.placement.translation = copy.placement.translation + way;
+    copy.velocity.centre = copy.velocity.centre + way;
+    block.push_back(std::move(copy));
+  }
+  return block;
+}
 /// Everything that a scene of material points has besides what all scenes have.
 ParticleScene read_particle_scene(Section const& root, Scene const& scene);
 ScenePin read_pin(Section const& section, Scene const& scene);

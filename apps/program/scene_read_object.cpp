@@ -169,17 +169,7 @@ std::vector<SceneObject> read_object(Section const& section, Scene const& scene)
   }
   object.start = read_start(section);
   require_start_allowed(object);
-  Copies const copies = read_copies(section);
-  if (!copies.named) return {object};
-  std::vector<SceneObject> block;
-  for (Point const& way : copies.ways) {
-    SceneObject copy = object;
-    copy.name = fmt::format("{}-{}", object.name, block.size());
-    copy.placement.translation = copy.placement.translation + way;
-    copy.velocity.centre = copy.velocity.centre + way;  // moves along
-    block.push_back(std::move(copy));
-  }
-  return block;
+  return copies_of(object, section);
 }
 
 }  // namespace taut

@@ -47,24 +47,8 @@ Shape read_shape_kind(Section const& s, ShapeOf owner) {
     keys.insert(keys.end(), common.begin(), common.end());
     s.allow(keys);
   };
+  if (auto const solid = read_solid(s, kind, common)) return *solid;
   auto const length = [&](std::string_view key) { return s.number(key, length_range); };
-  if (kind == "box") {
-    allow({"size"});
-    Point const size = s.point("size", "m");
-    for (double const edge : size)
-      if (!length_range.contains(edge))
-        throw Error("{}: {} has an edge of {} m: it must be {}", s.at("size").place, s.path("size"),
-                    edge, length_range.describe());
-    return BoxShape{size};
-  }
-  if (kind == "beam") {
-    allow({"length", "height", "width"});
-    return BoxShape{{length("length"), length("height"), length("width")}};
-  }
-  if (kind == "sheet") {
-    allow({"length", "width", "thickness"});
-    return BoxShape{{length("length"), length("thickness"), length("width")}};
-  }
   if (kind == "boxes") {
     allow({"boxes"});
     BoxUnionShape shape;
@@ -77,22 +61,6 @@ Shape read_shape_kind(Section const& s, ShapeOf owner) {
     allow({"height", "depth"});
     double const height = s.number("height", length_range, LetterEShape{}.height);
     return LetterEShape{height, s.number("depth", length_range, height / 1.125)};
-  }
-  if (kind == "cylinder") {
-    allow({"radius", "height"});
-    return CylinderShape{length("radius"), length("height"), 1};
-  }
-  if (kind == "rod") {
-    allow({"radius", "length"});
-    return CylinderShape{length("radius"), length("length"), 0};
-  }
-  if (kind == "sphere") {
-    allow({"radius"});
-    return SphereShape{length("radius")};
-  }
-  if (kind == "torus") {
-    allow({"radius", "tube_radius"});
-    return TorusShape{length("radius"), length("tube_radius")};
   }
   if (kind == "bowl") {
     allow({"radius", "thickness", "height"});
@@ -132,6 +100,51 @@ int scaled(Shape const& shape, int resolution, double factor) {
 }
 
 }  // namespace
+
+std::optional<Shape> read_solid(Section const& s, std::string_view kind,
+                                std::vector<std::string_view> const& common, double scale) {
+  auto const allow = [&](std::vector<std::string_view> keys) {
+    keys.insert(keys.end(), common.begin(), common.end());
+    s.allow(keys);
+  };
+  auto const length = [&](std::string_view key) { return scale * s.number(key, length_range); };
+  if (kind == "box") {
+    allow({"size"});
+    Point size = s.point("size", "m");
+    for (double& edge : size) {
+      if (!length_range.contains(edge))
+        throw Error("{}: {} has an edge of {} m: it must be {}", s.at("size").place, s.path("size"),
+                    edge, length_range.describe());
+      edge *= scale;
+    }
+    return BoxShape{size};
+  }
+  if (kind == "beam") {
+    allow({"length", "height", "width"});
+    return BoxShape{{length("length"), length("height"), length("width")}};
+  }
+  if (kind == "sheet") {
+    allow({"length", "width", "thickness"});
+    return BoxShape{{length("length"), length("thickness"), length("width")}};
+  }
+  if (kind == "sphere") {
+    allow({"radius"});
+    return SphereShape{length("radius")};
+  }
+  if (kind == "cylinder") {
+    allow({"radius", "height"});
+    return CylinderShape{length("radius"), length("height"), 1};
+  }
+  if (kind == "rod") {
+    allow({"radius", "length"});
+    return CylinderShape{length("radius"), length("length"), 0};
+  }
+  if (kind == "torus") {
+    allow({"radius", "tube_radius"});
+    return TorusShape{length("radius"), length("tube_radius")};
+  }
+  return {};
+}
 
 bool has_shape(Section const& section) {
   bool const shape = section.find("shape") != nullptr, mesh = section.find("mesh") != nullptr;

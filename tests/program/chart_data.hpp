@@ -1,7 +1,7 @@
 // Charts of small scenes, and their data as tests read it.
 #pragma once
 
-#include <taut/apps/program/chart.hpp>
+#include <taut/apps/program/chart_table.hpp>
 #include <taut/core/io/file.hpp>
 
 #include <map>
@@ -12,18 +12,6 @@
 namespace taut::test {
 
 using Row = std::map<std::string, std::string>;
-
-inline std::vector<std::string> split(std::string const& line) {
-  std::vector<std::string> fields(1);
-  for (char c : line) {
-    if (c == ',') {
-      fields.emplace_back();
-    } else {
-      fields.back() += c;
-    }
-  }
-  return fields;
-}
 
 struct Data {
   std::string header;
@@ -45,9 +33,9 @@ inline Data read_data(std::filesystem::path const& file) {
     if (line.starts_with("# ")) {
       data.header += line + "\n";
     } else if (names.empty()) {
-      names = split(line);
+      names = split_row(line);
     } else {
-      std::vector<std::string> const fields = split(line);
+      std::vector<std::string> const fields = split_row(line);
       REQUIRE(fields.size() == names.size());
       Row row;
       for (std::size_t i = 0; i < names.size(); ++i) row[names[i]] = fields[i];
