@@ -5,6 +5,7 @@
 #pragma once
 
 #include <taut/contact/contact_kernels.hpp>
+#include <taut/core/exec/copy.hpp>
 #include <taut/core/exec/sort.hpp>
 
 #include <cmath>
@@ -31,7 +32,7 @@ VectorField<double, S> copy_points(char const* name, std::vector<Point> const& p
   auto const host = Kokkos::create_mirror_view(to);
   for (std::size_t i = 0; i < points.size(); ++i)
     for (int c = 0; c < 3; ++c) host(i, c) = points[i][c];
-  Kokkos::deep_copy(to, host);
+  assign(to, host);
   return to;
 }
 
@@ -65,7 +66,7 @@ public:
     fields_ = {Array<Real, S>("contact_area", area.size()), {}, fixed, activation.dhat};
     auto const host = Kokkos::create_mirror_view(fields_.area);
     for (std::size_t i = 0; i < area.size(); ++i) host(i) = static_cast<Real>(area[i]);
-    Kokkos::deep_copy(fields_.area, host);
+    assign(fields_.area, host);
   }
 
   kernels::PairTable<Precision, S> const& pairs() const { return pairs_; }
@@ -88,7 +89,7 @@ public:
     if (fields_.stiffness.extent(0) == 0) {
       fields_.stiffness = Array<Real, S>("contact_vertex_stiffness", stiffness.extent(0));
     }
-    Kokkos::deep_copy(S::instance(), fields_.stiffness, stiffness);
+    assign_on<S>(fields_.stiffness, stiffness);
     taken_ = 0;
   }
 

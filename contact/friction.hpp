@@ -25,6 +25,7 @@
 #include <taut/contact/contact_islands.hpp>
 #include <taut/contact/friction_coefficients.hpp>
 #include <taut/contact/friction_kernels.hpp>
+#include <taut/core/exec/copy.hpp>
 
 #include <cmath>
 #include <functional>
@@ -187,7 +188,7 @@ public:
     if (!(length > 0 && std::isfinite(length))) {
       throw Error("friction: a step of {} s: give a positive time step", start.time_step);
     }
-    Kokkos::deep_copy(Space::instance(), state_->from, start.x);
+    assign_on<Space>(state_->from, start.x);
     state_->length = length;
     state_->lag(start.x);
   }

@@ -1,6 +1,7 @@
 // Coefficients of friction mu by pairs of objects.
 #pragma once
 
+#include <taut/core/exec/copy.hpp>
 #include <taut/core/exec/space.hpp>
 #include <taut/core/report/error.hpp>
 
@@ -56,8 +57,8 @@ public:
   template <class S>
   kernels::FrictionMatrix<S> in_space() const {
     Kokkos::View<double*, typename S::memory> const to("friction_coefficients", entry_.size());
-    Kokkos::deep_copy(to, Kokkos::View<double const*, Kokkos::HostSpace, Kokkos::MemoryUnmanaged>(
-                              entry_.data(), entry_.size()));
+    assign(to, Kokkos::View<double const*, Kokkos::HostSpace, Kokkos::MemoryUnmanaged>(
+                   entry_.data(), entry_.size()));
     return {others_, objects_, to};
   }
 

@@ -20,6 +20,7 @@
 #pragma once
 
 #include <taut/contact/vertex_slots.hpp>
+#include <taut/core/exec/copy.hpp>
 #include <taut/core/exec/sort.hpp>
 
 #include <limits>
@@ -224,10 +225,10 @@ private:
     auto const used = Kokkos::make_pair(0, count_);
     if (count_ == 0) {
     } else if constexpr (View::rank() == 1) {
-      Kokkos::deep_copy(S::instance(), Kokkos::subview(to, used), Kokkos::subview(view, used));
+      assign_on<S>(Kokkos::subview(to, used), Kokkos::subview(view, used));
     } else {
-      Kokkos::deep_copy(S::instance(), Kokkos::subview(to, used, Kokkos::ALL),
-                        Kokkos::subview(view, used, Kokkos::ALL));
+      assign_on<S>(Kokkos::subview(to, used, Kokkos::ALL),
+                   Kokkos::subview(view, used, Kokkos::ALL));
     }
     view = to;
   }

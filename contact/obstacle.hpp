@@ -17,6 +17,7 @@
 #include <taut/contact/adaptive_stiffness.hpp>
 #include <taut/contact/lag_obstacle.hpp>
 #include <taut/contact/obstacle_kernels.hpp>
+#include <taut/core/exec/copy.hpp>
 
 #include <algorithm>
 #include <cmath>
@@ -312,7 +313,7 @@ private:
           throw Error("obstacle: the triangles around vertex {} have no area: mend the mesh", v);
         }
       }
-      Kokkos::deep_copy(field, to);
+      assign(field, to);
       return field;
     }
     int vertices() const { return static_cast<int>(table.vertex.extent(0)); }
@@ -336,7 +337,7 @@ private:
       if (table.fields.stiffness.extent(0) == 0) {
         table.fields.stiffness = Array<Real, Space>("obstacle_stiffness", stiffness.extent(0));
       }
-      Kokkos::deep_copy(Space::instance(), table.fields.stiffness, stiffness);
+      assign_on<Space>(table.fields.stiffness, stiffness);
     }
 
     void enter(Positions const& x) {
@@ -362,7 +363,7 @@ private:
     LimitingVertex vertex_of(BoundedStep const& step) const {
       int const i = step.pair / Shape::max_faces;
       int vertex;
-      Kokkos::deep_copy(vertex, Kokkos::subview(table.vertex, i));
+      assign(vertex, Kokkos::subview(table.vertex, i));
       return {vertex, step.pair % Shape::max_faces, step.alpha};
     }
 

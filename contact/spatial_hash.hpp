@@ -20,6 +20,7 @@
 #pragma once
 
 #include <taut/contact/broad_phase.hpp>
+#include <taut/core/exec/copy.hpp>
 #include <taut/core/exec/sort.hpp>
 
 #include <bit>
@@ -191,7 +192,7 @@ public:
   }
 
   void build(BoxSet<S> const& boxes) {
-    Kokkos::deep_copy(S::instance(), occupied_, 0u);
+    assign_on<S>(occupied_, 0u);
     for_each<S>("hash_boxes", boxes.count,
                 kernels::HashBoxes<S>{grid_, boxes.box, bucket_, occupied_});
     sort_.sort(boxes.count, bucket_, static_cast<int>(grid_.mask + 1), begin_, order_);

@@ -7,6 +7,7 @@
 // lowers the energy, and when prescribed unknowns have moved.
 #pragma once
 
+#include <taut/core/exec/copy.hpp>
 #include <taut/integrators/line_search.hpp>
 #include <taut/integrators/preconditioner.hpp>
 #include <taut/integrators/report.hpp>
@@ -170,7 +171,7 @@ private:
     Heading const heading = aim(renewed);
     report_.gradient_norm = std::sqrt(heading.gradient / scale_.mass);
     if (!std::isfinite(heading.slope)) {
-      if (report_.iterations > 0) Kokkos::deep_copy(S::instance(), x_, fields_.from);
+      if (report_.iterations > 0) assign_on<S>(x_, fields_.from);
       report_.stop = Stop::non_finite;
     } else if (heading.descent == 0) {
       if (advance_prescribed())
@@ -315,7 +316,7 @@ private:
   }
 
   void start_travel() {
-    if (!scale_.has_inertia) Kokkos::deep_copy(S::instance(), fields_.origin, x_);
+    if (!scale_.has_inertia) assign_on<S>(fields_.origin, x_);
     lost_energy_ = 0;
   }
   void learn_curvature(double along_p, bool solved) {

@@ -2,6 +2,7 @@
 // and as an oracle.
 #pragma once
 
+#include <taut/core/exec/copy.hpp>
 #include <taut/core/sparse/direct_solver.hpp>
 #include <taut/integrators/linear_solver.hpp>
 
@@ -30,13 +31,13 @@ public:
                      M const&, LinearTolerance const&, Vectors const& p) {
     if (solver_.factorize(matrix_.at(e, x)) != Definiteness::positive) return {};
     int const n = static_cast<int>(b.extent(0));
-    Kokkos::deep_copy(host_, b);
+    assign(host_, b);
     for (int i = 0; i < n; ++i)
       for (int c = 0; c < 3; ++c) numbers_[3 * i + c] = double(host_(i, c));
     solver_.solve(numbers_, numbers_);
     for (int i = 0; i < n; ++i)
       for (int c = 0; c < 3; ++c) host_(i, c) = typename P::real(numbers_[3 * i + c]);
-    Kokkos::deep_copy(p, host_);
+    assign(p, host_);
     return {.stop = LinearStop::converged, .iterations = 1, .residual = 0};
   }
 

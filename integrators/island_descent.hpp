@@ -27,6 +27,7 @@
 // costs what it did.
 #pragma once
 
+#include <taut/core/exec/copy.hpp>
 #include <taut/integrators/island_ledger.hpp>
 
 #include <algorithm>
@@ -108,7 +109,7 @@ private:
     }
     measure();
     if (!aim()) {
-      if (report_.iterations > 0) Kokkos::deep_copy(S::instance(), x_, fields_.from);
+      if (report_.iterations > 0) assign_on<S>(x_, fields_.from);
       report_.stop = Stop::non_finite;
     } else if (ledger_.any_works()) {
       step();

@@ -6,6 +6,7 @@
 // energy along its way is not what the parts knew.
 #pragma once
 
+#include <taut/core/exec/copy.hpp>
 #include <taut/core/potential/objective.hpp>
 #include <taut/integrators/conjugate_dots.hpp>
 
@@ -152,9 +153,9 @@ public:
     if (version == version_) return false;
     version_ = version;
     previous_.assign(host_label_.data(), host_label_.data() + count());
-    Kokkos::deep_copy(S::instance(), label_, host_label_);
+    assign_on<S>(label_, host_label_);
     e.link(label_);
-    Kokkos::deep_copy(S::instance(), host_label_, label_);
+    assign_on<S>(host_label_, label_);
     S::instance().fence("taut: islands");
     return !std::equal(previous_.begin(), previous_.end(), host_label_.data());
   }
@@ -163,7 +164,7 @@ public:
   /// The body that unknown i is of.
   int body_of(int i) const {
     int b = 0;
-    Kokkos::deep_copy(b, Kokkos::subview(bodies_.of, i));
+    assign(b, Kokkos::subview(bodies_.of, i));
     return b;
   }
 
@@ -173,11 +174,11 @@ public:
   Real& factor(int b) { return factor_(b); }
   void set_turn(int b, kernels::Turn turn) { turn_(b) = int(turn); }
   void send_turns() const {
-    Kokkos::deep_copy(S::instance(), turns_.beta, beta_);
-    Kokkos::deep_copy(S::instance(), turns_.gamma, gamma_);
-    Kokkos::deep_copy(S::instance(), turns_.turn, turn_);
+    assign_on<S>(turns_.beta, beta_);
+    assign_on<S>(turns_.gamma, gamma_);
+    assign_on<S>(turns_.turn, turn_);
   }
-  void send_factors() const { Kokkos::deep_copy(S::instance(), turns_.factor, factor_); }
+  void send_factors() const { assign_on<S>(turns_.factor, factor_); }
   Turns const& turns() const { return turns_; }
   /// Marks the unknowns of bodies whose turn is to rest; the mask is empty if there are none.
   IdleMask<S> idle() const {

@@ -2,6 +2,7 @@
 // within Objective::max_step, or a fraction of that.
 #pragma once
 
+#include <taut/core/exec/copy.hpp>
 #include <taut/core/potential/objective.hpp>
 #include <taut/integrators/preconditioner.hpp>
 
@@ -101,7 +102,7 @@ public:
   }
   /// Back to where the line begins, exactly.
   void retreat() {
-    if (moved_) Kokkos::deep_copy(S::instance(), x_, fields_.from);
+    if (moved_) assign_on<S>(x_, fields_.from);
   }
   /// Evaluates the gradient at x; the energy difference to the beginning.
   double evaluate() {

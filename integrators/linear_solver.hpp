@@ -2,6 +2,7 @@
 // Stiefel 1952) on the assembled Hessian or on products that are never assembled.
 #pragma once
 
+#include <taut/core/exec/copy.hpp>
 #include <taut/core/sparse/operations.hpp>
 #include <taut/integrators/fields.hpp>
 #include <taut/integrators/preconditioner.hpp>
@@ -132,12 +133,11 @@ public:
   template <class Product, class M>
   LinearReport solve(Product const& product, M const& preconditioner, Vectors const& b,
                      LinearTolerance const& tolerance, int max_iterations, Vectors const& p) const {
-    typename S::execution const& execution = S::instance();
     int const n = static_cast<int>(b.extent(0));
-    Kokkos::deep_copy(execution, p, Real(0));
-    Kokkos::deep_copy(execution, r_, b);
+    assign_on<S>(p, Real(0));
+    assign_on<S>(r_, b);
     preconditioner.apply(r_, z_);
-    Kokkos::deep_copy(execution, d_, z_);
+    assign_on<S>(d_, z_);
     double const first = dot(r_, z_);
     LinearReport report{.stop = LinearStop::converged, .residual = 0};
     if (first == 0) return report;
@@ -160,7 +160,7 @@ public:
       double const curvature = sums[Curvature::form];
       double const terms = std::max(sums[Curvature::moduli], stiffest * d_Pinv_d);
       if (!(r_P_r > 0) || !(curvature > lost * terms)) {
-        if (report.iterations == 0) Kokkos::deep_copy(execution, p, z_);
+        if (report.iterations == 0) assign_on<S>(p, z_);
         report.stop = LinearStop::truncated;
         return report;
       }

@@ -12,6 +12,7 @@
 // one would call rest. What creeps slower than `speed` stops, and no error estimate says so.
 #pragma once
 
+#include <taut/core/exec/copy.hpp>
 #include <taut/core/report/error.hpp>
 #include <taut/integrators/islands.hpp>
 
@@ -236,9 +237,9 @@ private:
   void find_islands(Potential& potential, Positions const& x) {
     potential.pattern_version(x);
     for (int b = 0; b < bodies_.count; ++b) host_flag_(b) = b;
-    Kokkos::deep_copy(S::instance(), flag_, host_flag_);
+    assign_on<S>(flag_, host_flag_);
     potential.link(flag_);
-    Kokkos::deep_copy(S::instance(), host_flag_, flag_);
+    assign_on<S>(host_flag_, flag_);
     S::instance().fence("taut: islands");
     label_.assign(host_flag_.data(), host_flag_.data() + bodies_.count);
   }
@@ -259,7 +260,7 @@ private:
   template <class Flag>
   void send(Flag const& of) {
     for (int b = 0; b < bodies_.count; ++b) host_flag_(b) = of(b) ? 1 : 0;
-    Kokkos::deep_copy(S::instance(), flag_, host_flag_);
+    assign_on<S>(flag_, host_flag_);
     S::instance().fence("taut: sleep");
   }
 

@@ -17,6 +17,7 @@
 // motion through its iterations.
 #pragma once
 
+#include <taut/core/exec/copy.hpp>
 #include <taut/core/exec/growing.hpp>
 #include <taut/core/exec/parallel.hpp>
 #include <taut/core/potential/local_terms.hpp>
@@ -44,9 +45,7 @@ struct State {
   State() = default;
   explicit State(int n) : x("x", n), v("v", n), x_last("x_last", n), v_last("v_last", n) {}
   /// At rest at these positions.
-  explicit State(Positions const& at) : State(static_cast<int>(at.extent(0))) {
-    Kokkos::deep_copy(x, at);
-  }
+  explicit State(Positions const& at) : State(static_cast<int>(at.extent(0))) { assign(x, at); }
   int size() const { return static_cast<int>(x.extent(0)); }
 };
 

@@ -4,6 +4,7 @@
 // are: none relative to the solid (sticky), none along the normal (slip), none into it (separate).
 #pragma once
 
+#include <taut/core/exec/copy.hpp>
 #include <taut/core/exec/growing.hpp>
 #include <taut/core/exec/space.hpp>
 #include <taut/core/math/rigid_pose.hpp>
@@ -157,7 +158,7 @@ public:
       host_(k) = {spec.shape, spec.contact, spec.outside, spec.friction,
                   spec.size,  at.pose,      at.velocity,  at.spin};
     }
-    Kokkos::deep_copy(S::instance(), list_, host_);
+    assign_on<S>(list_, host_);
     S::instance().fence("taut: boundaries");
   }
 

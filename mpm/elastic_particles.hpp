@@ -5,6 +5,7 @@
 // Copies share nothing that changes within a step, so a Potential made after `update` may hold one.
 #pragma once
 
+#include <taut/core/exec/copy.hpp>
 #include <taut/core/fem/element_material.hpp>
 #include <taut/core/potential/term.hpp>
 #include <taut/core/report/error.hpp>
@@ -96,7 +97,7 @@ public:
     for (std::size_t k = 0; k < materials.size(); ++k) {
       host(k) = norm_at_rest<Material>(materials[k]);
     }
-    Kokkos::deep_copy(norms, host);
+    assign(norms, host);
     norms_ = norms;
   }
 
@@ -233,7 +234,7 @@ private:
     List<MaterialParameters> const view("materials", list.size());
     auto const host = Kokkos::create_mirror_view(view);
     for (std::size_t k = 0; k < list.size(); ++k) host(k) = list[k];
-    Kokkos::deep_copy(view, host);
+    assign(view, host);
     return view;
   }
 

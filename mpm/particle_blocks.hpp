@@ -15,6 +15,7 @@
 // Sorted anew each step; memory grows and is kept.
 #pragma once
 
+#include <taut/core/exec/copy.hpp>
 #include <taut/core/exec/growing.hpp>
 #include <taut/core/exec/sort.hpp>
 #include <taut/core/math/matrix.hpp>
@@ -378,10 +379,8 @@ void ParticleBlocks<K, S>::sort(Positions const& x, List<int const> const& mater
   kernels::PaddedCount<S> const counts{first_, patches, count, lanes_};
   views_.slots = exclusive_scan<S, int>("slot_begin", patches, counts, views_.slot_begin);
   using Last = Kokkos::pair<int, int>;
-  Kokkos::deep_copy(S::instance(), Kokkos::subview(views_.slot_begin, Last(patches, patches + 1)),
-                    views_.slots);
-  Kokkos::deep_copy(S::instance(), Kokkos::subview(views_.patch_begin, Last(blocks, blocks + 1)),
-                    patches);
+  assign_on<S>(Kokkos::subview(views_.slot_begin, Last(patches, patches + 1)), views_.slots);
+  assign_on<S>(Kokkos::subview(views_.patch_begin, Last(blocks, blocks + 1)), patches);
   grow(views_.particle, "slot_particle", views_.slots);
   grow(views_.corner, "slot_corner", views_.slots);
   grow(views_.round_end, "round_end", views_.slots);

@@ -2,6 +2,7 @@
 // are the unknowns of the step. Made anew each step; memory is kept.
 #pragma once
 
+#include <taut/core/exec/copy.hpp>
 #include <taut/core/potential/unknowns.hpp>
 #include <taut/mpm/boundary.hpp>
 #include <taut/mpm/sparse_grid.hpp>
@@ -130,7 +131,7 @@ public:
     for_each<Space>("node_places", n,
                     kernels::PlaceOfNode<Space, Precision>{grid_.nodes(), transfer_.mass(), rest_,
                                                            unknowns_.mass});
-    Kokkos::deep_copy(Space::instance(), unknowns_.fixed, std::uint8_t(0));
+    assign_on<Space>(unknowns_.fixed, std::uint8_t(0));
   }
 
   /// Fixes nodes in sticky boundaries, which are where they will be in h seconds.

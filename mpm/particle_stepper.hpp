@@ -10,6 +10,7 @@
 // tried with half the time.
 #pragma once
 
+#include <taut/core/exec/copy.hpp>
 #include <taut/mpm/particle_grid.hpp>
 
 #include <algorithm>
@@ -147,8 +148,8 @@ private:
     state_.v = memory_[1].resize("node_v", n);
     state_.x_last = memory_[2].resize("node_x_last", n);
     state_.v_last = memory_[3].resize("node_v_last", n);
-    Kokkos::deep_copy(Space::instance(), state_.x, grid.rest());
-    Kokkos::deep_copy(Space::instance(), state_.v, grid.velocity());
+    assign_on<Space>(state_.x, grid.rest());
+    assign_on<Space>(state_.v, grid.velocity());
     state_.last_step = 0;
   }
   /// A bound of how far a particle goes: nodes tell soon; if one goes too far, particles are asked.

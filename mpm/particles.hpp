@@ -1,6 +1,7 @@
 // Material points: what a body is made of between the steps of a grid.
 #pragma once
 
+#include <taut/core/exec/copy.hpp>
 #include <taut/core/exec/space.hpp>
 #include <taut/core/math/matrix.hpp>
 #include <taut/core/report/error.hpp>
@@ -132,16 +133,16 @@ private:
       material_(p) = from.material;
       object_(p) = from.object;
     }
-    Kokkos::deep_copy(x, x_);
-    Kokkos::deep_copy(v, v_);
-    Kokkos::deep_copy(C, C_);
-    Kokkos::deep_copy(F, F_);
-    Kokkos::deep_copy(mass, mass_);
-    Kokkos::deep_copy(volume, volume_);
-    Kokkos::deep_copy(stiffness, stiffness_);
-    Kokkos::deep_copy(plastic, plastic_);
-    Kokkos::deep_copy(material, material_);
-    Kokkos::deep_copy(object, object_);
+    assign(x, x_);
+    assign(v, v_);
+    assign(C, C_);
+    assign(F, F_);
+    assign(mass, mass_);
+    assign(volume, volume_);
+    assign(stiffness, stiffness_);
+    assign(plastic, plastic_);
+    assign(material, material_);
+    assign(object, object_);
   }
 };
 

@@ -6,6 +6,7 @@
 //   sand         logarithm of the volume gained without stress (no hardening with strain)
 #pragma once
 
+#include <taut/core/exec/copy.hpp>
 #include <taut/materials/granular.hpp>
 #include <taut/materials/von_mises.hpp>
 #include <taut/mpm/transfer.hpp>
@@ -59,7 +60,7 @@ public:
       : list_("material_flow", materials.size()) {
     auto const host = Kokkos::create_mirror_view(list_);
     for (std::size_t k = 0; k < materials.size(); ++k) host(k) = materials[k];
-    Kokkos::deep_copy(list_, host);
+    assign(list_, host);
   }
 
   KOKKOS_FUNCTION void operator()(int material, Mat3<double>& F, double& plastic,

@@ -17,6 +17,7 @@
 // with f the force s |n . d| and e = stick_speed h (Li et al. 2020, section 5, for its smoothing).
 #pragma once
 
+#include <taut/core/exec/copy.hpp>
 #include <taut/core/exec/parallel.hpp>
 #include <taut/core/exec/scan.hpp>
 #include <taut/core/potential/term.hpp>
@@ -291,8 +292,7 @@ public:
     Count const count{boundaries_, boundaries.count(), rest};
     grow(views_.begin, "slip_begin", nodes_ + 1);
     int const pairs = exclusive_scan<Space, int>("count_slip", nodes_, count, views_.begin);
-    Kokkos::deep_copy(Space::instance(),
-                      Kokkos::subview(views_.begin, Kokkos::make_pair(nodes_, nodes_ + 1)), pairs);
+    assign_on<Space>(Kokkos::subview(views_.begin, Kokkos::make_pair(nodes_, nodes_ + 1)), pairs);
     grow(views_.pair, "slip_pairs", pairs);
     grow(views_.stiffness, "slip_stiffness", nodes_);
     views_.stick = params_.stick_speed * h;

@@ -6,6 +6,7 @@
 // the number of threads.
 #pragma once
 
+#include <taut/core/exec/copy.hpp>
 #include <taut/core/exec/scan.hpp>
 #include <taut/mpm/grid_level.hpp>
 
@@ -123,7 +124,7 @@ private:
   void clear_masks(std::size_t n) {
     if (n == 0) return;
     auto const range = Kokkos::make_pair(std::size_t(0), n);
-    Kokkos::deep_copy(S::instance(), Kokkos::subview(mask_, range, Kokkos::ALL), std::uint64_t(0));
+    assign_on<S>(Kokkos::subview(mask_, range, Kokkos::ALL), std::uint64_t(0));
   }
 
   /// Leaves that particles are in and that are not known yet.

@@ -3,6 +3,7 @@
 // (h/2) - v. It keeps the energy of an undamped swing, which implicit Euler loses.
 #include "bar.hpp"
 
+#include <taut/core/exec/copy.hpp>
 #include <taut/integrators/ncg.hpp>
 
 using namespace taut;
@@ -16,7 +17,7 @@ public:
     auto const target = potential.template term<Inertia<>>().target();
     State<>::Positions const y("midpoint", state.size());
     axpy(target, 1, state.x, h / 2, state.v);
-    Kokkos::deep_copy(y, target);
+    assign(y, target);
     potential.predict(y);
     pin(potential.unknowns(), state.x, y);
     MinimiserReport const report = minimiser_.minimise(potential, y);

@@ -4,6 +4,7 @@
 // w = 0.45 keeps w H B below 2 and P positive definite.
 #include "bar.hpp"
 
+#include <taut/core/exec/copy.hpp>
 #include <taut/integrators/ncg.hpp>
 
 #include <functional>
@@ -29,7 +30,7 @@ public:
   template <class E>
   void update(E& e, Positions const& x) {
     BlockJacobi<P, S>::update(e, x);
-    Kokkos::deep_copy(at_, x);
+    assign(at_, x);
     product_ = [&e, at = at_](Vectors const& p, Vectors const& hp) { e.product(at, p, hp); };
   }
   void apply(Vectors const& g, Vectors const& z) const {

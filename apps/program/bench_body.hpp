@@ -2,6 +2,7 @@
 #pragma once
 
 #include <taut/apps/program/methods.hpp>
+#include <taut/core/exec/copy.hpp>
 
 #include <string>
 #include <vector>
@@ -35,7 +36,7 @@ VectorField<T, DefaultSpace> bench_field(BenchBody const& body, Where const& whe
     Point const p = where(body.rest.points[i]);
     for (int c = 0; c < 3; ++c) host(i, c) = static_cast<T>(p[c]);
   }
-  Kokkos::deep_copy(field, host);
+  assign(field, host);
   return field;
 }
 

@@ -10,6 +10,7 @@
 #include <taut/apps/program/bench_variants.hpp>
 #include <taut/contact/contact.hpp>
 #include <taut/contact/spatial_hash.hpp>
+#include <taut/core/exec/copy.hpp>
 #include <taut/core/report/error.hpp>
 
 namespace taut {
@@ -98,7 +99,7 @@ private:
     auto const host = Kokkos::create_mirror_view(to);
     for (std::size_t i = 0; i < from.size(); ++i)
       for (int c = 0; c < 3; ++c) host(i, c) = static_cast<T>(from[i][c]);
-    Kokkos::deep_copy(to, host);
+    assign(to, host);
     return to;
   }
 
@@ -220,7 +221,7 @@ private:
                                    1.0, alpha);
       };
     };
-    Kokkos::deep_copy(alpha, 1);
+    assign(alpha, 1);
     bound(rows, "planar", found, vertices(PlanarScaling{}));
     bound(rows, "isotropic", found, vertices(IsotropicPerVertex{}));
   }
@@ -246,14 +247,13 @@ private:
     std::vector<Point> target = scene_.rest.points;
     for (std::size_t v = 0; v < target.size(); ++v)
       for (int c = 0; c < 3; ++c) target[v][c] += 100 * scene_.direction[v][c];
-    Kokkos::deep_copy(potential.template term<Inertia<P>>().target(),
-                      field<typename P::position>(target));
+    assign(potential.template term<Inertia<P>>().target(), field<typename P::position>(target));
     Positions const x("bench_x", x_.extent(0));
     AnyMinimiser<P> minimiser(bench_pncg(options_.iterations));
     int taken = 0;
     auto const run = [&] {
       contact.begin_step({x_, h, {}});
-      Kokkos::deep_copy(x, x_);
+      assign(x, x_);
       taken = minimiser.minimise(potential, x, {}).iterations;
       if (taken < 2) throw Error("bench: the step with contact stops after {} iterations", taken);
     };

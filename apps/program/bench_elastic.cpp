@@ -3,6 +3,7 @@
 #include <taut/apps/program/bench_counts.hpp>
 #include <taut/apps/program/bench_memory.hpp>
 #include <taut/apps/program/bench_variants.hpp>
+#include <taut/core/exec/copy.hpp>
 #include <taut/core/fem/ordering.hpp>
 #include <taut/core/fem/rest_shape.hpp>
 #include <taut/core/report/error.hpp>
@@ -109,7 +110,7 @@ private:
     ProgramPotential<P> potential(unknowns, Inertia<P>(unknowns),
                                   BodyForce<P>(unknowns, {0, -9.81, 0}), terms, {});
     potential.begin_step(start, h * h, h, true);
-    Kokkos::deep_copy(potential.template term<Inertia<P>>().target(), start);
+    assign(potential.template term<Inertia<P>>().target(), start);
     typename Unknowns<P>::Positions const x("x", start.extent(0));
     AnyMinimiser<P> minimiser(bench_pncg(iterations));
 
@@ -122,7 +123,7 @@ private:
       clock.restart();
     };
     auto const run = [&] {
-      Kokkos::deep_copy(x, start);
+      assign(x, start);
       int const taken = minimiser.minimise(potential, x, observe).iterations;
       if (taken < 2) throw Error("bench: {} stops after {} iterations", model_, taken);
     };

@@ -2,6 +2,7 @@
 #include <taut/apps/program/methods.hpp>
 #include <taut/apps/program/obstacle_terms.hpp>
 #include <taut/apps/program/simulation.hpp>
+#include <taut/core/exec/copy.hpp>
 #include <taut/core/fem/ordering.hpp>
 #include <taut/core/fem/rest_shape.hpp>
 #include <taut/core/report/error.hpp>
@@ -140,7 +141,7 @@ public:
       auto const host = Kokkos::create_mirror_view(field);
       for (int i = 0; i < size(); ++i)
         for (int c = 0; c < 3; ++c) host(i, c) = numbers[3 * i + c];
-      Kokkos::deep_copy(field, host);
+      assign(field, host);
     }
     if (sleep().on) {
       quiet_ = checkpoint.get<std::int32_t>("quiet_steps");
@@ -407,7 +408,7 @@ private:
 
   /// Pins and forces of the step that ends at time t.
   void prescribe(double t, double h) {
-    Kokkos::deep_copy(fixed_, std::uint8_t(0));
+    assign(fixed_, std::uint8_t(0));
     Marks marks;
     for (Pin const& pin : geometry_.pins) {
       std::uint8_t const mark = marks.next(pin.motion);
@@ -429,12 +430,12 @@ private:
       SceneObstacle const& obstacle = scene_.obstacles[k];
       if (formulas_[k]) formulas_[k]->move_to(compose(obstacle.motion.at(t), obstacle.placement));
     }
-    Kokkos::deep_copy(potential_.unknowns().fixed, fixed_);
-    Kokkos::deep_copy(potential_.unknowns().prescribed, prescribed_);
+    assign(potential_.unknowns().fixed, fixed_);
+    assign(potential_.unknowns().prescribed, prescribed_);
 
     bool any = false;
     auto const host = Kokkos::create_mirror_view(forces_);
-    Kokkos::deep_copy(host, 0);
+    assign(host, 0);
     for (Force const& force : geometry_.forces) {
       if (!force.window.covers_step(t, h)) continue;
       any = true;
@@ -447,7 +448,7 @@ private:
         }
       }
     }
-    Kokkos::deep_copy(forces_, host);
+    assign(forces_, host);
     potential_.template term<BodyForce<P>>().set_forces(any ? forces_ : Vectors());
   }
 
@@ -536,7 +537,7 @@ private:
     auto const host = Kokkos::create_mirror_view(field);
     for (int i = 0; i < size(); ++i)
       for (int c = 0; c < 3; ++c) host(i, c) = static_cast<Position>(all[order_.vertices[i]][c]);
-    Kokkos::deep_copy(field, host);
+    assign(field, host);
   }
   std::vector<Point> read(Positions const& field) const {
     auto const host = Kokkos::create_mirror_view_and_copy(Kokkos::HostSpace(), field);

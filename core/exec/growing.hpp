@@ -2,6 +2,7 @@
 // grows seldom allocates.
 #pragma once
 
+#include <taut/core/exec/copy.hpp>
 #include <taut/core/exec/space.hpp>
 
 #include <cstddef>
@@ -61,10 +62,10 @@ void copy_front(From const& from, To const& to, std::size_t count) {
   }
   auto const range = Kokkos::make_pair(std::size_t(0), count);
   if constexpr (From::rank() == 1) {
-    Kokkos::deep_copy(S::instance(), Kokkos::subview(to, range), Kokkos::subview(from, range));
+    assign_on<S>(Kokkos::subview(to, range), Kokkos::subview(from, range));
   } else {
-    Kokkos::deep_copy(S::instance(), Kokkos::subview(to, range, Kokkos::ALL),
-                      Kokkos::subview(from, range, Kokkos::ALL));
+    assign_on<S>(Kokkos::subview(to, range, Kokkos::ALL),
+                 Kokkos::subview(from, range, Kokkos::ALL));
   }
   S::instance().fence("taut: copy");
 }

@@ -6,6 +6,7 @@
 // `FreeReducer` is the opt-out: it leaves the order to Kokkos.
 #pragma once
 
+#include <taut/core/exec/copy.hpp>
 #include <taut/core/exec/host_loop.hpp>
 #include <taut/core/report/error.hpp>
 
@@ -220,7 +221,7 @@ public:
       count = next;
     }
     auto const range = Kokkos::make_pair(std::size_t(0), std::size_t(K) * count);
-    Kokkos::deep_copy(S::instance(), Kokkos::subview(host_, range), Kokkos::subview(from, range));
+    assign_on<S>(Kokkos::subview(host_, range), Kokkos::subview(from, range));
     S::instance().fence("taut: reduction");
     Sums<T, K> total;
     for (int i = 0; i < count; ++i)

@@ -7,6 +7,7 @@
 // so nothing is atomic.
 #pragma once
 
+#include <taut/core/exec/copy.hpp>
 #include <taut/core/exec/scan.hpp>
 
 #include <bit>
@@ -151,7 +152,7 @@ private:
   template <class View>
   static void copy(int n, View const& from, View const& to) {
     auto const range = Kokkos::make_pair(0, n);
-    Kokkos::deep_copy(S::instance(), Kokkos::subview(to, range), Kokkos::subview(from, range));
+    assign_on<S>(Kokkos::subview(to, range), Kokkos::subview(from, range));
   }
 
   int max_keys_ = 0;

@@ -2,6 +2,7 @@
 // unknowns, and the way back to the input's order.
 #pragma once
 
+#include <taut/core/exec/copy.hpp>
 #include <taut/core/fem/ordering.hpp>
 #include <taut/core/fem/rest_shape.hpp>
 #include <taut/core/potential/unknowns.hpp>
@@ -26,7 +27,7 @@ struct Body {
     }
     std::vector<double> const densities(rest.tets.size(), density);
     unknowns = Unknowns<Precision, Space>(lumped_mass(rest, densities), mean_edge_length(rest));
-    Kokkos::deep_copy(unknowns.prescribed, positions());
+    assign(unknowns.prescribed, positions());
   }
 
   /// Holds the vertices whose rest position satisfies `where` at their rest position.
@@ -34,7 +35,7 @@ struct Body {
   void fix(Where const& where) {
     auto const fixed = Kokkos::create_mirror_view(unknowns.fixed);
     for (std::size_t i = 0; i < rest.points.size(); ++i) fixed(i) = where(rest.points[i]) ? 1 : 0;
-    Kokkos::deep_copy(unknowns.fixed, fixed);
+    assign(unknowns.fixed, fixed);
   }
 
   /// The rest positions as a field.
@@ -45,7 +46,7 @@ struct Body {
       for (int c = 0; c < 3; ++c) {
         host(i, c) = static_cast<typename Precision::position>(rest.points[i][c]);
       }
-    Kokkos::deep_copy(x, host);
+    assign(x, host);
     return x;
   }
   /// A field in the order of the input's vertices.

@@ -9,6 +9,7 @@
 // neither on the number of threads nor on the size of a team.
 #pragma once
 
+#include <taut/core/exec/copy.hpp>
 #include <taut/core/exec/space.hpp>
 #include <taut/core/fem/tet_mesh.hpp>
 #include <taut/core/math/scalar.hpp>
@@ -79,7 +80,7 @@ Kokkos::View<T const*, typename S::memory, Kokkos::MemoryTraits<Kokkos::RandomAc
       Kokkos::view_alloc(Kokkos::WithoutInitializing, std::string(name)), from.size());
   Kokkos::View<T const*, Kokkos::HostSpace, Kokkos::MemoryTraits<Kokkos::Unmanaged>> host(
       from.data(), from.size());
-  Kokkos::deep_copy(to, host);
+  assign(to, host);
   return to;
 }
 

@@ -5,6 +5,7 @@
 // library they depend on the number of terms alone, never on the number of threads.
 #pragma once
 
+#include <taut/core/exec/copy.hpp>
 #include <taut/core/exec/parallel.hpp>
 #include <taut/core/sparse/pattern.hpp>
 
@@ -35,7 +36,7 @@ template <class S>
 typename Bodies<S>::Indices indices_in_space(char const* name, std::vector<int> const& from) {
   typename Bodies<S>::Indices const to(name, from.size());
   using Host = Kokkos::View<int const*, Kokkos::HostSpace, Kokkos::MemoryUnmanaged>;
-  Kokkos::deep_copy(to, Host(from.data(), from.size()));
+  assign(to, Host(from.data(), from.size()));
   return to;
 }
 
@@ -178,7 +179,7 @@ public:
                 kernels::SumChunk<S, View, Functor, T, K>{bodies_, functor, partial_});
     for_each<S>(name, bodies_.count, kernels::SumBody<S, View, K>{bodies_, partial_, total_});
     auto const used = Kokkos::make_pair(std::size_t(0), std::size_t(K) * bodies_.count);
-    Kokkos::deep_copy(S::instance(), Kokkos::subview(host_, used), Kokkos::subview(total_, used));
+    assign_on<S>(Kokkos::subview(host_, used), Kokkos::subview(total_, used));
     S::instance().fence("taut: sums over bodies");
     return {host_.data(), std::size_t(K) * bodies_.count};
   }

@@ -6,6 +6,7 @@
 // A term that is not named does not exist in any loop. h^2 is applied here and nowhere else.
 #pragma once
 
+#include <taut/core/exec/copy.hpp>
 #include <taut/core/exec/growing.hpp>
 #include <taut/core/exec/parallel.hpp>
 #include <taut/core/potential/local_terms.hpp>
@@ -496,7 +497,7 @@ public:
   /// What residuals of unknowns are measured by, N: the sum over the terms that can tell.
   void characteristic_force(Array<double, Space> const& force) const
       requires(CharacteristicTerm<Terms> || ...) {
-    Kokkos::deep_copy(Space::instance(), force, 0.0);
+    assign_on<Space>(force, 0.0);
     for_each_of<is_characteristic>([&](auto const& term) { term.add_characteristic_force(force); });
   }
 

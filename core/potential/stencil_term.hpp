@@ -7,6 +7,7 @@
 #pragma once
 
 #include <taut/core/exec/buckets.hpp>
+#include <taut/core/exec/copy.hpp>
 #include <taut/core/exec/parallel.hpp>
 #include <taut/core/potential/term.hpp>
 #include <taut/core/report/error.hpp>
@@ -247,8 +248,8 @@ private:
 
   static Indices copy(char const* name, std::vector<int> const& from) {
     Indices to(name, from.size());
-    Kokkos::deep_copy(to, Kokkos::View<int const*, Kokkos::HostSpace, Kokkos::MemoryUnmanaged>(
-                              from.data(), from.size()));
+    assign(to, Kokkos::View<int const*, Kokkos::HostSpace, Kokkos::MemoryUnmanaged>(from.data(),
+                                                                                    from.size()));
     return to;
   }
   int count() const { return static_cast<int>(vertices_.size()) / N; }

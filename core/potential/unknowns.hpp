@@ -1,6 +1,7 @@
 // The unknowns of a potential: how many, how heavy, which are fixed and where those are going.
 #pragma once
 
+#include <taut/core/exec/copy.hpp>
 #include <taut/core/potential/term.hpp>
 
 #include <span>
@@ -27,7 +28,7 @@ struct Unknowns {
     for (std::size_t i = 0; i < lumped.size(); ++i) {
       host(i) = static_cast<typename Precision::real>(lumped[i]);
     }
-    Kokkos::deep_copy(mass, host);
+    assign(mass, host);
   }
 
   int size() const { return static_cast<int>(mass.extent(0)); }

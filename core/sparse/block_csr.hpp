@@ -1,6 +1,7 @@
 // Compressed sparse rows of 3x3 blocks: the assembled Hessian of a potential over 3-vectors.
 #pragma once
 
+#include <taut/core/exec/copy.hpp>
 #include <taut/core/exec/parallel.hpp>
 #include <taut/core/math/matrix.hpp>
 #include <taut/core/sparse/pattern.hpp>
@@ -25,8 +26,8 @@ struct BlockCsr {
         column("column", pattern.column.size()),
         block("block", pattern.column.size()) {
     using Host = Kokkos::View<int const*, Kokkos::HostSpace, Kokkos::MemoryUnmanaged>;
-    Kokkos::deep_copy(row_begin, Host(pattern.row_begin.data(), pattern.row_begin.size()));
-    Kokkos::deep_copy(column, Host(pattern.column.data(), pattern.column.size()));
+    assign(row_begin, Host(pattern.row_begin.data(), pattern.row_begin.size()));
+    assign(column, Host(pattern.column.data(), pattern.column.size()));
   }
 
   KOKKOS_FUNCTION int rows() const {

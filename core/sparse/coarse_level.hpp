@@ -6,6 +6,7 @@
 // Unknowns that nothing couples to (fixed ones) are left out of R: their z stays zero.
 #pragma once
 
+#include <taut/core/exec/copy.hpp>
 #include <taut/core/sparse/block_csr.hpp>
 #include <taut/core/sparse/direct_solver.hpp>
 
@@ -130,10 +131,10 @@ public:
   template <class R>
   void add(VectorField<R, S> const& r, VectorField<R, S> const& z) const {
     for_each<S>("coarse_restrict", runs_, kernels::RestrictRun<S, R>{coupled_, r, unknowns_, run_});
-    Kokkos::deep_copy(host_, unknowns_);
+    assign(host_, unknowns_);
     std::span<double> const numbers(host_.data(), host_.extent(0));
     solver_.solve(numbers, numbers);
-    Kokkos::deep_copy(unknowns_, host_);
+    assign(unknowns_, host_);
     for_each<S>("coarse_prolong", static_cast<int>(z.extent(0)),
                 kernels::AddProlonged<S, R>{coupled_, unknowns_, z, run_});
   }

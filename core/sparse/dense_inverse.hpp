@@ -2,6 +2,7 @@
 // dense matrix: what the coarsest level of a hierarchy is solved with, without leaving the device.
 #pragma once
 
+#include <taut/core/exec/copy.hpp>
 #include <taut/core/exec/growing.hpp>
 #include <taut/core/exec/parallel.hpp>
 
@@ -49,7 +50,7 @@ public:
     }
     for (int i = 0; i < numbers_; ++i)
       for (int j = 0; j < numbers_; ++j) host_(i, j) = a[std::size_t(numbers_) * i + j];
-    Kokkos::deep_copy(S::instance(), inverse_, host_);
+    assign_on<S>(inverse_, host_);
     S::instance().fence("taut: dense inverse");
     return shift;
   }

@@ -72,7 +72,7 @@ struct SlidingBlock {
     auto const v = Kokkos::create_mirror_view(state.v);
     for (std::size_t i = 0; i < object.size(); ++i)
       for (int c = 0; c < 3; ++c) v(i, c) = object[i] == 1 ? velocity[c] : 0;
-    Kokkos::deep_copy(state.v, v);
+    assign(state.v, v);
   }
   /// Mean over the mass of the block of a field.
   Point mean(State<Fp64>::Positions const& field) const {
@@ -111,7 +111,7 @@ private:
     body.unknowns.length = side / 4;  // of the plate's edges
     auto const fixed = Kokkos::create_mirror_view(body.unknowns.fixed);
     for (std::size_t v = 0; v < object.size(); ++v) fixed(v) = object[v] == 0;
-    Kokkos::deep_copy(body.unknowns.fixed, fixed);
+    assign(body.unknowns.fixed, fixed);
     return body.unknowns;
   }
   Friction<Fp64> rough(Params const& p) const {

@@ -165,7 +165,7 @@ VectorField<T, S> to_field(std::vector<Point> const& from) {
   auto const host = Kokkos::create_mirror_view(field);
   for (std::size_t v = 0; v < from.size(); ++v)
     for (int c = 0; c < 3; ++c) host(v, c) = static_cast<T>(from[v][c]);
-  Kokkos::deep_copy(field, host);
+  assign(field, host);
   return field;
 }
 

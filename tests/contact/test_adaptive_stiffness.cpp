@@ -39,7 +39,7 @@ double adapted_form(Term const& term, VectorField<double, S> const& x,
   auto const to = Kokkos::create_mirror_view(start.gradient);
   for (int i = 0; i < n; ++i)
     for (int c = 0; c < 3; ++c) to(i, c) = -factor * scale * from(i, c);
-  Kokkos::deep_copy(start.gradient, to);
+  assign(start.gradient, to);
   term.begin_step(start);
   return term.quadratic_form(x, p, 1) / least;
 }

@@ -232,7 +232,7 @@ TEST_CASE("pairs whose vertices are all fixed are left out, and no others", "[co
   std::vector<char> fixed(soup.x.size());
   auto const host = Kokkos::create_mirror_view(motion.fixed);
   for (std::size_t v = 0; v < fixed.size(); ++v) host(v) = fixed[v] = v % 5 != 0;
-  Kokkos::deep_copy(motion.fixed, host);
+  assign(motion.fixed, host);
   auto const leave_free = [&](std::vector<std::array<int, 4>> pairs) {
     std::erase_if(pairs, [&](auto const& p) {
       return std::all_of(p.begin(), p.end(), [&](int v) { return fixed[v] != 0; });

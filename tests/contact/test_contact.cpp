@@ -56,9 +56,9 @@ struct Fixture {
         diagonal("diagonal", s.size()),
         blocks("blocks", s.size()) {}
   void clear() {
-    Kokkos::deep_copy(g, 0);
-    Kokkos::deep_copy(diagonal, 0);
-    Kokkos::deep_copy(blocks, 0);
+    assign(g, 0);
+    assign(diagonal, 0);
+    assign(blocks, 0);
   }
   Oracle oracle() const {
     return {scene.surface, scene.rest, to_points(x), Squashed::dhat, 0.5, pressure};
@@ -91,7 +91,7 @@ void move(Field const& x, std::vector<Point> const& from, std::vector<Point> con
     for (int c = 0; c < 3; ++c) {
       host(v, c) = static_cast<typename Field::non_const_value_type>(from[v][c] + by * p[v][c]);
     }
-  Kokkos::deep_copy(x, host);
+  assign(x, host);
 }
 
 /// All that the term computes, bit by bit.
@@ -256,10 +256,10 @@ TEST_CASE("rows of fixed vertices are left alone, and pairs of them are none", "
   Fixture<Fp64> f;
   auto const mask = Kokkos::create_mirror_view(f.unknowns.fixed);
   for (int v = 0; v < f.scene.size(); ++v) mask(v) = f.scene.surface.object[v] == 0;
-  Kokkos::deep_copy(f.unknowns.fixed, mask);
+  assign(f.unknowns.fixed, mask);
   f.contact.begin_step({f.x, 1, {}});
-  Kokkos::deep_copy(f.g, 7);
-  Kokkos::deep_copy(f.blocks, 7);
+  assign(f.g, 7);
+  assign(f.blocks, 7);
   f.contact.add_gradient(f.x, 1, f.unknowns.fixed, f.g, f.blocks);
   f.contact.add_product(f.x, f.p, 1, f.unknowns.fixed, f.g);
   auto const g = to_points(f.g);
@@ -273,7 +273,7 @@ TEST_CASE("rows of fixed vertices are left alone, and pairs of them are none", "
   }
   CHECK(alone);
   CHECK(moved);
-  Kokkos::deep_copy(f.unknowns.fixed, 1);
+  assign(f.unknowns.fixed, 1);
   f.contact.begin_step({f.x, 1, {}});
   CHECK(f.contact.value(f.x, 1) == 0);
   CHECK(f.contact.max_step(f.x, f.p, 100.0) == 100.0);
@@ -421,11 +421,11 @@ TEST_CASE("stiffness may follow what the vertices resist with", "[contact]") {
   auto const x = soups::to_field<double, DefaultSpace>(s.x);
   CHECK_THROWS_WITH(contact.value(x, 1), ContainsSubstring("call begin_step"));
   Array<double, DefaultSpace> const field("stiffness", s.size());
-  Kokkos::deep_copy(field, 100);
+  assign(field, 100);
   contact.begin_step({x, 1, field});
   double const one = contact.value(x, 1);
   CHECK(one > 0);
-  Kokkos::deep_copy(field, 300);  // copied: nothing changes within the step
+  assign(field, 300);  // copied: nothing changes within the step
   CHECK(contact.value(x, 1) == one);
   contact.begin_step({x, 1, field});
   CHECK_THAT(contact.value(x, 1), WithinRel(3 * one, 1e-12));
@@ -436,8 +436,8 @@ TEST_CASE("stiffness may follow what the vertices resist with", "[contact]") {
     mask(v) = s.surface.object[v] == 0;
     host(v) = mask(v) ? 1e9 : 100;
   }
-  Kokkos::deep_copy(unknowns.fixed, mask);
-  Kokkos::deep_copy(field, host);
+  assign(unknowns.fixed, mask);
+  assign(field, host);
   contact.begin_step({x, 1, field});
   double const free = contact.value(x, 1);
   CHECK(free > 0);

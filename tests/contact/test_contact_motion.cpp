@@ -42,7 +42,7 @@ struct FallingBox {
     surface = make_surface(boundary_faces(body.rest.tets), object);
     auto const fixed = Kokkos::create_mirror_view(body.unknowns.fixed);
     for (std::size_t v = 0; v < object.size(); ++v) fixed(v) = object[v] == 0;
-    Kokkos::deep_copy(body.unknowns.fixed, fixed);
+    assign(body.unknowns.fixed, fixed);
   }
   /// Mean height of the lower face of the box, m.
   double bottom(State<> const& state) const {
@@ -65,7 +65,7 @@ struct FallingBox {
   void throw_down(State<> const& state, double speed) const {
     auto const v = Kokkos::create_mirror_view(state.v);
     for (std::size_t i = 0; i < object.size(); ++i) v(i, 1) = object[i] == 1 ? -speed : 0;
-    Kokkos::deep_copy(state.v, v);
+    assign(state.v, v);
   }
   /// Where the lower box is to be at the end of the next step: `by` m above its rest position.
   void raise(double by) const {
@@ -74,7 +74,7 @@ struct FallingBox {
       for (int c = 0; c < 3; ++c) {
         to(i, c) = body.rest.points[i][c] + (c == 1 && object[i] == 0 ? by : 0);
       }
-    Kokkos::deep_copy(body.unknowns.prescribed, to);
+    assign(body.unknowns.prescribed, to);
   }
 
 private:
@@ -195,7 +195,7 @@ TEST_CASE("what is pinned by different marks does not cross either", "[contact]"
   for (std::size_t v = 0; v < scene.object.size(); ++v) {
     mark(v) = one_mark ? 1 : static_cast<std::uint8_t>(1 + scene.object[v]);
   }
-  Kokkos::deep_copy(scene.body.unknowns.fixed, mark);
+  assign(scene.body.unknowns.fixed, mark);
   Contact<> const contact(scene.body.unknowns, scene.surface, scene.body.rest.points, {});
   Potential potential(scene.body.unknowns, Inertia(scene.body.unknowns), contact);
   Falling stepper({.budget = {.max_iterations = 1000}});
@@ -228,8 +228,8 @@ TEST_CASE("one contact rests where K b' balances the load, whatever the time ste
   Unknowns<Fp64> unknowns(std::vector<double>(6, mass), dhat);
   auto const fixed = Kokkos::create_mirror_view(unknowns.fixed);
   for (int v = 0; v < 6; ++v) fixed(v) = v != 3;
-  Kokkos::deep_copy(unknowns.fixed, fixed);
-  Kokkos::deep_copy(unknowns.prescribed, soups::to_field<double, DefaultSpace>(rest));
+  assign(unknowns.fixed, fixed);
+  assign(unknowns.prescribed, soups::to_field<double, DefaultSpace>(rest));
 
   // K |b'(d)| = m g, by bisection: |b'| falls with d.
   double low = 0, high = dhat;

@@ -38,7 +38,7 @@ void fill(Field const& x, std::vector<Point> const& from, std::vector<Point> con
     for (int c = 0; c < 3; ++c) {
       host(v, c) = static_cast<typename Field::non_const_value_type>(from[v][c] + by * p[v][c]);
     }
-  Kokkos::deep_copy(x, host);
+  assign(x, host);
 }
 
 /// The squashed cubes, each vertex moved by up to `slip` e since the step began.
@@ -78,9 +78,9 @@ struct Fixture {
     fill(p, direction, direction, 0);
   }
   void clear() {
-    Kokkos::deep_copy(g, 0);
-    Kokkos::deep_copy(diagonal, 0);
-    Kokkos::deep_copy(blocks, 0);
+    assign(g, 0);
+    assign(diagonal, 0);
+    assign(blocks, 0);
   }
   template <class Mu>
   FrictionOracle oracle(Mu const& mu) const {
@@ -328,9 +328,9 @@ TEST_CASE("rows of fixed vertices are left alone by friction", "[friction]") {
   Fixture<Fp64> f(1.0);
   auto const mask = Kokkos::create_mirror_view(f.unknowns.fixed);
   for (int v = 0; v < f.scene.size(); ++v) mask(v) = f.scene.surface.object[v] == 0;
-  Kokkos::deep_copy(f.unknowns.fixed, mask);
-  Kokkos::deep_copy(f.g, 7);
-  Kokkos::deep_copy(f.blocks, 7);
+  assign(f.unknowns.fixed, mask);
+  assign(f.g, 7);
+  assign(f.blocks, 7);
   f.friction.add_gradient(f.x, 1, f.unknowns.fixed, f.g, f.blocks);
   f.friction.add_product(f.x, f.p, 1, f.unknowns.fixed, f.g);
   auto const g = to_points(f.g);

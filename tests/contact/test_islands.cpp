@@ -56,7 +56,7 @@ struct Flight {
     auto const v = Kokkos::create_mirror_view(state.v);
     for (std::size_t i = 0; i < object.size(); ++i)
       for (int c = 0; c < 3; ++c) v(i, c) = blocks[object[i]].velocity[c];
-    Kokkos::deep_copy(state.v, v);
+    assign(state.v, v);
   }
   /// Where the vertices of some blocks are, one block after the other, each in its own order.
   std::vector<Point> positions(std::vector<int> const& some) const {

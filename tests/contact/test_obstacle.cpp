@@ -57,7 +57,7 @@ struct Fixture {
       for (int c = 0; c < 3; ++c) {
         host(v, c) = static_cast<Position>(scene.x[v][c] + by * scene.p[v][c]);
       }
-    Kokkos::deep_copy(x, host);
+    assign(x, host);
   }
   typename Term::Vectors gradient() {
     typename Term::Vectors const to("gradient", scene.size());
@@ -204,7 +204,7 @@ TEMPLATE_TEST_CASE("energy, gradient and curvature of an obstacle belong togethe
     for (int c = 0; c < 3; ++c) {
       difference[v][c] = scale * (after[v][c] - difference[v][c]) / (2 * step);
     }
-  Kokkos::deep_copy(f.g, 0);
+  assign(f.g, 0);
   f.obstacle.add_product(f.x, f.p, scale, fixed, f.g);
   std::vector<Point> const hp = to_points(f.g);
   CHECK(furthest(hp, difference) < 2e-6 * largest(hp));
@@ -303,12 +303,12 @@ TEMPLATE_TEST_CASE("no step that an obstacle allows leaves it", "[obstacle]",
 
 TEST_CASE("an obstacle leaves fixed vertices alone, but not their way", "[obstacle]") {
   Fixture<HalfSpace, Fp64> f;
-  Kokkos::deep_copy(f.unknowns.fixed, 7);
+  assign(f.unknowns.fixed, 7);
   CHECK(f.obstacle.value(f.x, 1) == 0);
   CHECK(f.obstacle.change(f.x, f.p, 1e-3, 1) == 0);
   CHECK(f.obstacle.quadratic_form(f.x, f.p, 1) == 0);
   CHECK(f.obstacle.report(f.x).contacts == 0);
-  Kokkos::deep_copy(f.g, 7);
+  assign(f.g, 7);
   f.obstacle.add_gradient(f.x, 1, f.unknowns.fixed, f.g, f.blocks);
   f.obstacle.add_product(f.x, f.p, 1, f.unknowns.fixed, f.g);
   for (Point const& g : to_points(f.g)) CHECK(g == Point{7, 7, 7});
@@ -329,7 +329,7 @@ TEST_CASE("what starts beyond an obstacle is refused, unless it is held there", 
   auto const put = [&](double distance) {
     auto const host = Kokkos::create_mirror_view(f.x);
     for (int c = 0; c < 3; ++c) host(v, c) = at[c] + (distance - gap) * normal[c] / length;
-    Kokkos::deep_copy(f.x, host);
+    assign(f.x, host);
   };
   put(-0.01);
   CHECK_THROWS_WITH(f.obstacle.begin_step(start),
@@ -340,31 +340,31 @@ TEST_CASE("what starts beyond an obstacle is refused, unless it is held there", 
   put(1e-9);
   CHECK_NOTHROW(f.obstacle.begin_step(start));
   auto const host = Kokkos::create_mirror_view(f.x);
-  Kokkos::deep_copy(host, f.x);
+  assign(host, f.x);
   host(v, 1) = std::nan("");
-  Kokkos::deep_copy(f.x, host);
+  assign(f.x, host);
   CHECK_THROWS_AS(f.obstacle.begin_step(start), Error);
 
   // Pinned when it first meets it: held, and in nobody's way.
   put(-0.01);
   auto const mask = Kokkos::create_mirror_view(f.unknowns.fixed);
   mask(v) = 1;
-  Kokkos::deep_copy(f.unknowns.fixed, mask);
+  assign(f.unknowns.fixed, mask);
   CHECK_THROWS_AS(f.obstacle.begin_step(start), Error);  // it came in later
   f.obstacle.place(f.scene.pose);
   CHECK_NOTHROW(f.obstacle.begin_step(start));
   CHECK(f.obstacle.held() == 1);
-  Kokkos::deep_copy(f.p, 0);
+  assign(f.p, 0);
   auto const p = Kokkos::create_mirror_view(f.p);
   p(v, 0) = 5;
-  Kokkos::deep_copy(f.p, p);
+  assign(f.p, p);
   CHECK(f.obstacle.max_prescribed_step(f.x, f.p, 1) == 1);
   // Once it has come out it may not go back, nor may it be let go inside.
   mask(v) = 0;
-  Kokkos::deep_copy(f.unknowns.fixed, mask);
+  assign(f.unknowns.fixed, mask);
   CHECK_THROWS_AS(f.obstacle.begin_step(start), Error);
   mask(v) = 1;
-  Kokkos::deep_copy(f.unknowns.fixed, mask);
+  assign(f.unknowns.fixed, mask);
   put(0.01);
   CHECK_NOTHROW(f.obstacle.begin_step(start));
   CHECK(f.obstacle.held() == 0);
@@ -406,11 +406,11 @@ TEST_CASE("the stiffness of an obstacle may follow what the vertices resist with
                       f.scene.pose);
   CHECK_THROWS_WITH(obstacle.value(f.x, 1), ContainsSubstring("begin_step"));
   Array<double, DefaultSpace> const stiffness("stiffness", f.scene.size());
-  Kokkos::deep_copy(stiffness, 100);
+  assign(stiffness, 100);
   obstacle.begin_step({f.x, 0.01, stiffness});
   double const one = obstacle.value(f.x, 1);
   CHECK(one > 0);
-  Kokkos::deep_copy(stiffness, 300);  // copied: nothing changes within the step
+  assign(stiffness, 300);  // copied: nothing changes within the step
   CHECK(obstacle.value(f.x, 1) == one);
   obstacle.begin_step({f.x, 0.01, stiffness});
   CHECK_THAT(obstacle.value(f.x, 1), WithinRel(3 * one, 1e-12));

@@ -67,7 +67,7 @@ struct Block {
       Vec3<double> const go = velocity + cross(spin, at);
       for (int c = 0; c < 3; ++c) v(i, c) = go[c];
     }
-    Kokkos::deep_copy(state.v, v);
+    assign(state.v, v);
   }
 };
 
@@ -273,12 +273,12 @@ TEST_CASE("pins do not go through an obstacle, and say what holds them up", "[ob
   auto const to = Kokkos::create_mirror_view(held.body.unknowns.prescribed);
   for (std::size_t v = 0; v < held.body.rest.points.size(); ++v)
     for (int c = 0; c < 3; ++c) to(v, c) = held.body.rest.points[v][c] - (c == 1 ? 0.04 : 0);
-  Kokkos::deep_copy(held.body.unknowns.prescribed, to);
+  assign(held.body.unknowns.prescribed, to);
   stepper.step(potential, state, 0.01);
   CHECK_THAT(least_distance(HalfSpace{}, {}, held.surface, to_points(state.x)),
              WithinRel(0.01, 1e-9));
   for (std::size_t v = 0; v < held.body.rest.points.size(); ++v) to(v, 1) -= 0.02;
-  Kokkos::deep_copy(held.body.unknowns.prescribed, to);
+  assign(held.body.unknowns.prescribed, to);
   CHECK_THROWS_AS(stepper.step(potential, state, 0.01), HeldUp);
   CHECK(least_distance(HalfSpace{}, {}, held.surface, to_points(state.x)) > 0);
 }
@@ -291,9 +291,9 @@ TEST_CASE("a weight on a plane rests where P g' balances it, whatever the time s
   Unknowns<Fp64> unknowns(std::vector<double>(3, mass), dhat);
   auto const fixed = Kokkos::create_mirror_view(unknowns.fixed);
   for (int v = 0; v < 3; ++v) fixed(v) = v != 0;
-  Kokkos::deep_copy(unknowns.fixed, fixed);
+  assign(unknowns.fixed, fixed);
   auto const x0 = soups::to_field<double, DefaultSpace>(rest);
-  Kokkos::deep_copy(unknowns.prescribed, x0);
+  assign(unknowns.prescribed, x0);
   double const area = shown_areas(surface, rest)[0];
   double const share = resting_share(mass * gravity / area / pressure);
   REQUIRE(share > 0.1);

@@ -268,7 +268,7 @@ TEMPLATE_LIST_TEST_CASE("bounds of vertices are the least over their pairs", "[s
     Clearance const clearance;
     auto const run = [&] {
       Array<Position, S> alpha("alpha", c.x.extent(0));
-      Kokkos::deep_copy(alpha, Position(1));
+      assign(alpha, Position(1));
       auto const step = bound_vertices<typename TestType::Precision, S, kind>(
           bound, clearance, c.pairs, n, c.x, c.p, 1.0, alpha);
       std::vector<double> values(alpha.extent(0));
@@ -354,7 +354,7 @@ TEMPLATE_LIST_TEST_CASE("candidates cover the motion until a vertex has gone hal
   CHECK(step() > 0);
   x(1, 0) += 1;
   CHECK(step() == 0);
-  Kokkos::deep_copy(p, Real(0));
+  assign(p, Real(0));
   CHECK(step() == 1);
 }
 

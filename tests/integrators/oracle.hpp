@@ -41,7 +41,7 @@ typename Chain<Bond>::Positions minimum(Chain<Bond> const& chain,
   int const n = chain.size();
   typename Chain<Bond>::Positions const at("minimum", n);
   typename Chain<Bond>::Field const g("gradient", n), p("step", n);
-  Kokkos::deep_copy(at, x);
+  assign(at, x);
   auto hessian = chain.pattern(x);
   for (int iteration = 0; iteration < 200; ++iteration) {
     chain.gradient(at, g);

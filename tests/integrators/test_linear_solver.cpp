@@ -43,7 +43,7 @@ Solution solve(ProductWith<S> const& by_a, VectorField<double, S> const& b, doub
   int const n = by_a.a.rows();
   cg.resize(n);
   VectorField<double, S> const x("x", n);
-  Kokkos::deep_copy(x, 42.0);  // its old value is of no account
+  assign(x, 42.0);  // its old value is of no account
   LinearReport const report = cg.solve(by_a, preconditioner, b, tolerance, max_iterations, x);
   return {report, numbers(x)};
 }

@@ -318,8 +318,8 @@ public:
       for (int c = 0; c < 3; ++c)
         target(i, c) = real(0.4 * i * (c == 0) + 0.3 * std::sin(1.0 + 3.0 * i + 5.0 * c));
     }
-    Kokkos::deep_copy(data_.target, target);
-    Kokkos::deep_copy(data_.mass, mass);
+    assign(data_.target, target);
+    assign(data_.mass, mass);
   }
 
   /// Somewhere to start from: unknowns in order along the first axis, away from every minimum.
@@ -329,7 +329,7 @@ public:
     for (int i = 0; i < size(); ++i)
       for (int c = 0; c < 3; ++c)
         host(i, c) = real(0.5 * i * (c == 0) + 0.2 * std::sin(7.0 * i + 2.0 * c));
-    Kokkos::deep_copy(x, host);
+    assign(x, host);
     return x;
   }
 

@@ -49,7 +49,7 @@ Dense smoother_of(Smoother const& smoother, Fine const& fine) {
   int const n = fine.size();
   LevelVectors<T, S> v;
   v.resize(n);
-  Kokkos::deep_copy(v.b, T(0));
+  assign(v.b, T(0));
   Dense m(3 * n, 3 * n);
   for (int k = 0; k < 3 * n; ++k) {
     v.b(k / 3, k % 3) = 1;

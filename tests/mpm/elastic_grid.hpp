@@ -101,7 +101,7 @@ int pcg_iterations(Level const& a, Apply const& apply, double tolerance, int mos
   VectorField<T, S> r("r", n), z("z", n), y("y", n);
   a.product(p, r);
   apply(r, z);
-  Kokkos::deep_copy(p, z);
+  assign(p, z);
   double rho = flat(r, n).dot(flat(z, n));
   double const first = rho;
   for (int k = 1; k <= most; ++k) {

@@ -38,7 +38,7 @@ View field_of(Field const& from) {
     for (int c = 0; c < 3; ++c) {
       host(i, c) = static_cast<typename View::non_const_value_type>(from[i][c]);
     }
-  Kokkos::deep_copy(view, host);
+  assign(view, host);
   return view;
 }
 template <class View>
@@ -168,7 +168,7 @@ void check_sweeps() {
     // Fixed nodes receive nothing.
     auto const host_fixed = Kokkos::create_mirror_view(fixed);
     for (int i = 0; i < n; ++i) host_fixed(i) = i % 3 == 0;
-    Kokkos::deep_copy(fixed, host_fixed);
+    assign(fixed, host_fixed);
     Vectors const g_fixed("g", n);
     term.add_gradient(x, scale, fixed, g_fixed);
     Field const left = read(g_fixed);

@@ -64,7 +64,7 @@ struct OnGrid {
       for (int c = 0; c < 3; ++c) {
         host(n, c) = static_cast<typename Precision::position>(dx * at[n][c]);
       }
-    Kokkos::deep_copy(rest, host);
+    assign(rest, host);
   }
   int nodes() const { return grid.nodes().count; }
   /// The nodes in units of dx.

@@ -44,7 +44,7 @@ TEMPLATE_TEST_CASE("the coarse matrix is P'AP", "[galerkin]",
 
     GridMatrix<S, T, radius> coarse;
     coarse.resize(grid.nodes());
-    Kokkos::deep_copy(coarse.entry, T(7));  // what it was is no matter
+    assign(coarse.entry, T(7));  // what it was is no matter
     s.level.template coarse_matrix<Embedding>(coarse);
     double const close = (std::is_same_v<T, float> ? 1e-6 : 3e-15);
     CHECK((dense(coarse) - expected).norm() <= close * expected.norm());

@@ -54,8 +54,7 @@ TEMPLATE_TEST_CASE("products, sweeps and diagonals are those of the dense matrix
 
   LevelVectors<T, S> v;
   v.resize(n);
-  Kokkos::deep_copy(Kokkos::subview(v.b, Kokkos::make_pair(0, n), Kokkos::ALL),
-                    random_field<S, T>(n, 5));
+  assign(Kokkos::subview(v.b, Kokkos::make_pair(0, n), Kokkos::ALL), random_field<S, T>(n, 5));
   Eigen::VectorXd const b = flat(v.b, n);
 
   auto const x = random_field<S, T>(n, 6);

@@ -22,7 +22,7 @@ TEMPLATE_TEST_CASE(
   int const n = problem.scene.nodes();
   auto const host_fixed = Kokkos::create_mirror_view(problem.fixed);
   for (int i = 0; i < n; ++i) host_fixed(i) = i % 5 == 0;
-  Kokkos::deep_copy(problem.fixed, host_fixed);
+  assign(problem.fixed, host_fixed);
   std::vector<Connectivity> kinds;
   problem.term.elements(kinds);
   typename C::Term::Matrix const matrix(pattern_from_elements(n, kinds));

@@ -270,7 +270,7 @@ TEST_CASE("particles that are nowhere are named", "[mpm][transfer]") {
   ParticleBlocks<QuadraticSpline, S> blocks;
   CHECK_THROWS_WITH(blocks.sort(particles.x, particles.material, 2, 1, 1.0),
                     ContainsSubstring("spread over 2^27"));
-  Kokkos::deep_copy(particles.material, 3);
+  assign(particles.material, 3);
   CHECK_THROWS_WITH(blocks.sort(particles.x, particles.material, 2, 3, 10.0),
                     ContainsSubstring("particle 0 is of a material that is not one of the 3"));
   CHECK_THROWS_WITH(blocks.sort(particles.x, particles.material, 2, 9, 0.0),

@@ -69,9 +69,8 @@ struct Sample {
     std::mt19937 random(n);
     std::uniform_real_distribution<double> uniform(-1, 2);
     for (double& v : host) v = uniform(random);
-    Kokkos::deep_copy(device,
-                      Kokkos::View<double const*, Kokkos::HostSpace, Kokkos::MemoryUnmanaged>(
-                          host.data(), host.size()));
+    assign(device, Kokkos::View<double const*, Kokkos::HostSpace, Kokkos::MemoryUnmanaged>(
+                       host.data(), host.size()));
   }
   /// What a sum is to be, and how far round-off may take it: log2(n) + 512 additions at most follow
   /// each term.

@@ -28,8 +28,8 @@ constexpr int counts[] = {0, 1, 511, 512, 513, 4096, 4097, 100'000};
 template <class T>
 View<T> to_device(std::vector<T> const& from) {
   View<T> to("test", from.size());
-  Kokkos::deep_copy(to, Kokkos::View<T const*, Kokkos::HostSpace, Kokkos::MemoryUnmanaged>(
-                            from.data(), from.size()));
+  assign(to, Kokkos::View<T const*, Kokkos::HostSpace, Kokkos::MemoryUnmanaged>(from.data(),
+                                                                                from.size()));
   return to;
 }
 

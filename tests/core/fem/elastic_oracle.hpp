@@ -110,7 +110,7 @@ View to_field(std::vector<Point> const& from, View) {
     for (int c = 0; c < 3; ++c) {
       host(i, c) = static_cast<typename View::non_const_value_type>(from[i][c]);
     }
-  Kokkos::deep_copy(field, host);
+  assign(field, host);
   return field;
 }
 

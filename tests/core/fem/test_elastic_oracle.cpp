@@ -47,9 +47,9 @@ void compare(Sample const& body, SweepParams const& params, double tolerance) {
     CHECK(worst < tolerance);
   };
   auto const clear = [&] {
-    Kokkos::deep_copy(g, 0);
-    Kokkos::deep_copy(d, 0);
-    Kokkos::deep_copy(h, 0);
+    assign(g, 0);
+    assign(d, 0);
+    assign(h, 0);
   };
   clear();
   term.add_gradient(x, scale, fixed, g);
@@ -73,7 +73,7 @@ void compare(Sample const& body, SweepParams const& params, double tolerance) {
       worst = std::max(worst, std::abs(double(hh(i, k)) / scale - blocks[i].s[k]) / unit);
     }
   CHECK(worst < tolerance);
-  Kokkos::deep_copy(hp, 0);
+  assign(hp, 0);
   term.add_product(x, p, scale, fixed, hp);
   close(hp, oracle.product(body.x, body.p));
 }

@@ -143,7 +143,7 @@ TEST_CASE("F2: elastic forces have neither a resultant nor a torque", "[fem]") {
     Point const& X = turned.rest.points[i];
     turned.x[i] = {c * X[0] - s * X[1] + 5, s * X[0] + c * X[1], X[2] - 3};
   }
-  Kokkos::deep_copy(g, 0);
+  assign(g, 0);
   term.add_gradient(test::to_field(turned.x, Term::Positions()), 1.0, fixed, g);
   double largest_force = 0;
   for (std::size_t i = 0; i < n; ++i)

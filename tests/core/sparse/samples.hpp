@@ -64,7 +64,7 @@ BlockCsr<S> lattice_matrix(int n, double mass) {
   for (int i = 0; i < host.rows(); ++i) host.add(i, i, mass * identity3<double>());
 
   BlockCsr<S> matrix(pattern_from_elements(n * n * n, {&kind, 1}));
-  Kokkos::deep_copy(matrix.block, host.block);
+  assign(matrix.block, host.block);
   return matrix;
 }
 
@@ -77,7 +77,7 @@ VectorField<R, S> random_field(int n, unsigned seed) {
   std::uniform_real_distribution<double> uniform(-1, 1);
   for (int i = 0; i < n; ++i)
     for (int c = 0; c < 3; ++c) host(i, c) = R(uniform(random));
-  Kokkos::deep_copy(field, host);
+  assign(field, host);
   return field;
 }
 

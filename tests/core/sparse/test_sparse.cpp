@@ -111,7 +111,7 @@ TEST_CASE("assembly by colours gives the element sums") {
     Array<int, DefaultSpace> const colour("colour", last - first);
     auto const host = Kokkos::create_mirror_view(colour);
     std::copy(edges.begin() + first, edges.begin() + last, host.data());
-    Kokkos::deep_copy(colour, host);
+    assign(colour, host);
     for_each<DefaultSpace>("add_edges", static_cast<int>((last - first) / 2), AddEdge{a, colour});
     Kokkos::fence();
   }
@@ -149,7 +149,7 @@ TEMPLATE_TEST_CASE("products equal dense products in every layout", "", LeftSpac
     auto const to = Kokkos::create_mirror_view(a32.block);
     for (std::size_t k = 0; k < from.extent(0); ++k)
       for (int m = 0; m < 9; ++m) to(k).a[m] = static_cast<float>(from(k).a[m]);
-    Kokkos::deep_copy(a32.block, to);
+    assign(a32.block, to);
     auto const x32 = random_field<float, TestType>(a.rows(), 1);
     VectorField<float, TestType> const y32("y", a.rows());
     product(a32, x32, y32);
@@ -164,7 +164,7 @@ TEST_CASE("the diagonal is read with its symmetric part") {
   auto const host = host_copy(a);
   host.block(host.find(5, 5))(0, 1) += 0.5;
   host.block(host.find(5, 5))(1, 0) -= 0.5;
-  Kokkos::deep_copy(a.block, host.block);
+  assign(a.block, host.block);
   BlockField<double, DefaultSpace> const diagonal("diagonal", a.rows());
   diagonal_blocks(a, diagonal);
   auto const original = lattice_matrix<SerialSpace>(3, 1.0);
