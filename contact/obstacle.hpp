@@ -363,7 +363,7 @@ private:
     LimitingVertex vertex_of(BoundedStep const& step) const {
       int const i = step.pair / Shape::max_faces;
       int vertex;
-      assign(vertex, Kokkos::subview(table.vertex, i));
+      Kokkos::deep_copy(vertex, Kokkos::subview(table.vertex, i));
       return {vertex, step.pair % Shape::max_faces, step.alpha};
     }
 

@@ -164,7 +164,7 @@ public:
   /// The body that unknown i is of.
   int body_of(int i) const {
     int b = 0;
-    assign(b, Kokkos::subview(bodies_.of, i));
+    Kokkos::deep_copy(b, Kokkos::subview(bodies_.of, i));
     return b;
   }
 
