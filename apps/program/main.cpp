@@ -1,10 +1,8 @@
 // The program `taut`: maps the command line onto the commands.
-#include <taut/apps/program/bench.hpp>
-#include <taut/apps/program/bench_contact.hpp>
 #include <taut/apps/program/chart.hpp>
+#include <taut/apps/program/command_line.hpp>
 #include <taut/apps/program/commands.hpp>
 #include <taut/apps/program/render.hpp>
-#include <taut/apps/program/scene_value.hpp>
 #include <taut/core/io/hdf5.hpp>
 #include <taut/core/report/error.hpp>
 
@@ -12,12 +10,12 @@
 #include <CLI/CLI.hpp>
 #include <Kokkos_Core.hpp>
 
-#include <algorithm>
-#include <cstdlib>
+#include <unistd.h>
+
+#include <filesystem>
 #include <functional>
 #include <map>
-#include <new>
-#include <optional>
+#include <string_view>
 
 namespace {
 
@@ -46,38 +44,23 @@ void add_scene(CLI::App& command, SceneArguments& arguments) {
                 "factor of the resolution of every shape");
 }
 
-/// A list with commas; a word after it is the next argument of the command.
-template <class T>
-CLI::Option* add_list(CLI::App& command, std::string const& option, std::vector<T>& list,
-                      std::string const& help) {
-  return command.add_option(option, list, help)->delimiter(',')->allow_extra_args(false);
-}
-
-/// What all benches take.
-template <class Options>
-void add_bench(CLI::App& command, Options& options, std::string const& quick) {
-  add_list(command, "--precisions", options.precisions, "fp32, mixed, fp64");
-  command.add_option("--seconds", options.seconds, "spent on each number")->capture_default_str();
-  command.add_flag("--json", options.json, "a JSON list of rows");
-  command.add_flag("--quick", options.quick, quick);
-  add_list(command, "--threads", options.threads, "numbers of threads (1 and all)")
-      ->check(CLI::Range(1, 4096));
-}
-
-/// A first argument that is no command: the nearest one, if there is any.
-std::optional<std::string> unknown_command(CLI::App const& app, int argc, char** argv) {
-  if (argc < 2 || argv[1][0] == '-') return {};
-  std::vector<std::string> names;
-  for (CLI::App const* sub : app.get_subcommands({})) names.push_back(sub->get_name());
-  if (std::find(names.begin(), names.end(), argv[1]) != names.end()) return {};
-  std::vector<std::string_view> const views(names.begin(), names.end());
-  return fmt::format("there is no command \"{}\"{}; `taut --help` lists them", argv[1],
-                     suggestion(": did you mean \"", argv[1], views, "\"?"));
+/// Hands `taut bench ARGUMENTS...` over to taut_bench, which stands beside this program and is
+/// built when it is asked for. Returns only if it cannot.
+int hand_over_to_bench(char** argv) {
+  std::filesystem::path const program =
+      std::filesystem::read_symlink("/proc/self/exe").replace_filename("taut_bench");
+  execv(program.c_str(), argv + 1);
+  fmt::print(stderr,
+             "taut: {} cannot be started: build it (./taut bench does, or cmake --build with "
+             "--target taut_bench)\n",
+             program.string());
+  return 1;
 }
 
 }  // namespace
 
 int main(int argc, char** argv) {
+  if (argc > 1 && std::string_view(argv[1]) == "bench") return hand_over_to_bench(argv);
   hdf5::leave_files_at_exit();
   CLI::App app{"taut: implicit simulation of deformable solids", "taut"};
   app.set_version_flag("--version", "taut " TAUT_VERSION);
@@ -187,34 +170,14 @@ int main(int argc, char** argv) {
     command = [&] { return render_command(render); };
   });
 
-  BenchOptions bench;
+  // For the list of commands: what follows it is for the other program.
   auto* bench_app = app.add_subcommand("bench", "measures kernels against the machine's limits");
-  auto* elastic_app = bench_app->add_subcommand("elastic", "the elastic sweeps and an iteration");
-  bench_app->require_subcommand(1);
-  bench_app->footer("example: taut bench elastic --quick");
-  add_list(*elastic_app, "--materials", bench.materials, "models (all)");
-  add_list(*elastic_app, "--tets", bench.tets, "sizes of the mesh");
-  add_bench(*elastic_app, bench,
-            "a small mesh and hasty numbers, where --tets and --seconds say nothing");
-  elastic_app->footer("example: taut bench elastic --materials stable_neo_hookean --tets 500000");
-  elastic_app->callback([&] { command = [&] { return bench_command(bench); }; });
-
-  ContactBenchOptions contact_bench;
-  auto* contact_app =
-      bench_app->add_subcommand("contact", "search, sweeps and step bounds of contact");
-  add_list(*contact_app, "--contacts", contact_bench.contacts, "about so many pairs that act");
-  contact_app->add_option("--iterations", contact_bench.iterations, "of a step")
-      ->capture_default_str();
-  add_bench(*contact_app, contact_bench,
-            "a small scene and haste, where --contacts and --seconds say nothing");
-  contact_app->footer("example: taut bench contact --contacts 100000 --threads 2");
-  contact_app->callback([&] { command = [&] { return bench_contact_command(contact_bench); }; });
 
   for (CLI::App* sub : app.get_subcommands({})) {
     if (sub == bench_app) continue;
     sub->add_option("--threads", threads, "threads to use (all)")->check(CLI::Range(1, 4096));
   }
-  if (auto const message = unknown_command(app, argc, argv)) {
+  if (auto const message = unknown_command(app.get_name(), commands_of(app), argc, argv)) {
     fmt::print(stderr, "taut: {}\n", *message);
     return 1;
   }
@@ -223,16 +186,6 @@ int main(int argc, char** argv) {
   Kokkos::InitializationSettings settings;
   settings.set_disable_warnings(true);
   if (threads > 0) settings.set_num_threads(threads);
-  std::optional<Kokkos::ScopeGuard> kokkos;
-  if (!bench_app->parsed()) kokkos.emplace(settings);  // it starts Kokkos itself
-  try {
-    return command();
-  } catch (Error const& error) {
-    fmt::print(stderr, "taut: {}\n", error.what());
-  } catch (std::bad_alloc const&) {
-    fmt::print(stderr, "taut: out of memory: lower the resolution of the scene\n");
-  } catch (std::exception const& error) {
-    fmt::print(stderr, "taut: {}\n", error.what());
-  }
-  return 1;
+  Kokkos::ScopeGuard const kokkos(settings);
+  return ending_in_words(command);
 }

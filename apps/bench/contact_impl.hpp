@@ -2,12 +2,12 @@
 // them.
 #pragma once
 
-#include <taut/apps/program/bench_body.hpp>
-#include <taut/apps/program/bench_contact.hpp>
-#include <taut/apps/program/bench_contact_counts.hpp>
-#include <taut/apps/program/bench_contact_scene.hpp>
-#include <taut/apps/program/bench_memory.hpp>
-#include <taut/apps/program/bench_variants.hpp>
+#include <taut/apps/bench/body.hpp>
+#include <taut/apps/bench/contact.hpp>
+#include <taut/apps/bench/contact_counts.hpp>
+#include <taut/apps/bench/contact_scene.hpp>
+#include <taut/apps/bench/memory.hpp>
+#include <taut/apps/bench/variants.hpp>
 #include <taut/contact/contact.hpp>
 #include <taut/contact/spatial_hash.hpp>
 #include <taut/core/exec/copy.hpp>

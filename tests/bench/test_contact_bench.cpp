@@ -1,9 +1,9 @@
 // The rows of the contact bench, its scene and what its times are measured against. Times
 // themselves are not judged.
-#include <taut/apps/program/bench_contact.hpp>
-#include <taut/apps/program/bench_contact_counts.hpp>
-#include <taut/apps/program/bench_contact_scene.hpp>
-#include <taut/apps/program/bench_variants.hpp>
+#include <taut/apps/bench/contact.hpp>
+#include <taut/apps/bench/contact_counts.hpp>
+#include <taut/apps/bench/contact_scene.hpp>
+#include <taut/apps/bench/variants.hpp>
 #include <taut/contact/intersection.hpp>
 #include <taut/core/fem/rest_shape.hpp>
 #include <taut/core/report/error.hpp>

@@ -1,4 +1,4 @@
-#include <taut/apps/program/bench_contact_impl.hpp>
+#include <taut/apps/bench/contact_impl.hpp>
 
 namespace taut {
 template void measure_contact_scene<Fp64>(ContactScene const&, ContactBenchOptions const&,

@@ -1,6 +1,6 @@
-#include <taut/apps/program/bench_contact.hpp>
-#include <taut/apps/program/bench_contact_scene.hpp>
-#include <taut/apps/program/bench_process.hpp>
+#include <taut/apps/bench/contact.hpp>
+#include <taut/apps/bench/contact_scene.hpp>
+#include <taut/apps/bench/process.hpp>
 #include <taut/core/exec/space.hpp>
 #include <taut/core/report/error.hpp>
 #include <taut/core/report/record.hpp>

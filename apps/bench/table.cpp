@@ -1,4 +1,4 @@
-#include <taut/apps/program/bench_table.hpp>
+#include <taut/apps/bench/table.hpp>
 
 #include <fmt/format.h>
 

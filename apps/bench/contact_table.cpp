@@ -1,5 +1,5 @@
-#include <taut/apps/program/bench_contact.hpp>
-#include <taut/apps/program/bench_table.hpp>
+#include <taut/apps/bench/contact.hpp>
+#include <taut/apps/bench/table.hpp>
 
 #include <fmt/format.h>
 

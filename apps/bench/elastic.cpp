@@ -1,6 +1,6 @@
-#include <taut/apps/program/bench.hpp>
-#include <taut/apps/program/bench_process.hpp>
-#include <taut/apps/program/bench_table.hpp>
+#include <taut/apps/bench/elastic.hpp>
+#include <taut/apps/bench/process.hpp>
+#include <taut/apps/bench/table.hpp>
 #include <taut/apps/program/scene.hpp>
 #include <taut/core/report/error.hpp>
 #include <taut/core/report/record.hpp>

@@ -12,7 +12,7 @@
 //   iteration                 of PNCG, with all searches that a step of `iterations` needs
 #pragma once
 
-#include <taut/apps/program/bench_machine.hpp>
+#include <taut/apps/bench/machine.hpp>
 
 #include <string>
 #include <vector>

@@ -1,4 +1,4 @@
-#include <taut/apps/program/bench_contact_scene.hpp>
+#include <taut/apps/bench/contact_scene.hpp>
 #include <taut/core/fem/ordering.hpp>
 #include <taut/core/fem/rest_shape.hpp>
 #include <taut/core/fem/shapes.hpp>

@@ -9,7 +9,7 @@
 // a mollifier that does not act (21).
 #pragma once
 
-#include <taut/apps/program/bench_counts.hpp>
+#include <taut/apps/bench/counts.hpp>
 
 namespace taut {
 

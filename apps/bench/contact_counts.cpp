@@ -1,4 +1,4 @@
-#include <taut/apps/program/bench_contact_counts.hpp>
+#include <taut/apps/bench/contact_counts.hpp>
 
 namespace taut {
 namespace {

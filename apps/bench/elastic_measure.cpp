@@ -1,8 +1,8 @@
-#include <taut/apps/program/bench.hpp>
-#include <taut/apps/program/bench_body.hpp>
-#include <taut/apps/program/bench_counts.hpp>
-#include <taut/apps/program/bench_memory.hpp>
-#include <taut/apps/program/bench_variants.hpp>
+#include <taut/apps/bench/body.hpp>
+#include <taut/apps/bench/counts.hpp>
+#include <taut/apps/bench/elastic.hpp>
+#include <taut/apps/bench/memory.hpp>
+#include <taut/apps/bench/variants.hpp>
 #include <taut/core/exec/copy.hpp>
 #include <taut/core/fem/ordering.hpp>
 #include <taut/core/fem/rest_shape.hpp>

@@ -1,4 +1,4 @@
-#include <taut/apps/program/bench_process.hpp>
+#include <taut/apps/bench/process.hpp>
 #include <taut/core/report/error.hpp>
 
 #include <fmt/ranges.h>

@@ -6,8 +6,8 @@
 //                                      over the lanes of a pack that the compiler vectorises
 #pragma once
 
-#include <taut/apps/program/bench.hpp>
-#include <taut/apps/program/bench_counts.hpp>
+#include <taut/apps/bench/counts.hpp>
+#include <taut/apps/bench/elastic.hpp>
 
 namespace taut {
 

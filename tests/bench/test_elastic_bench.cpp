@@ -1,8 +1,8 @@
 // The bench's rows and what they are measured against. Times themselves are not judged.
-#include <taut/apps/program/bench.hpp>
-#include <taut/apps/program/bench_counts.hpp>
-#include <taut/apps/program/bench_table.hpp>
-#include <taut/apps/program/bench_variants.hpp>
+#include <taut/apps/bench/counts.hpp>
+#include <taut/apps/bench/elastic.hpp>
+#include <taut/apps/bench/table.hpp>
+#include <taut/apps/bench/variants.hpp>
 #include <taut/core/report/error.hpp>
 
 #include <catch2/catch_test_macros.hpp>

@@ -1,4 +1,4 @@
-#include <taut/apps/program/bench_memory.hpp>
+#include <taut/apps/bench/memory.hpp>
 
 #include <Kokkos_Core.hpp>
 #include <impl/Kokkos_Profiling.hpp>

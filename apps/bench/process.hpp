@@ -2,7 +2,7 @@
 // its own.
 #pragma once
 
-#include <taut/apps/program/bench_machine.hpp>
+#include <taut/apps/bench/machine.hpp>
 
 #include <nlohmann/json_fwd.hpp>
 

@@ -1,7 +1,7 @@
 // The measurements of the bench as tables for people.
 #pragma once
 
-#include <taut/apps/program/bench.hpp>
+#include <taut/apps/bench/elastic.hpp>
 
 namespace taut {
 

@@ -1,4 +1,4 @@
-#include <taut/apps/program/bench_machine.hpp>
+#include <taut/apps/bench/machine.hpp>
 #include <taut/core/exec/parallel.hpp>
 #include <taut/core/math/scalar.hpp>
 

@@ -1,7 +1,7 @@
 // `taut bench elastic`: what a sweep over the tets costs, against what this machine can do at most.
 #pragma once
 
-#include <taut/apps/program/bench_machine.hpp>
+#include <taut/apps/bench/machine.hpp>
 
 #include <string>
 #include <vector>

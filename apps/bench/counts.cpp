@@ -1,4 +1,4 @@
-#include <taut/apps/program/bench_counts.hpp>
+#include <taut/apps/bench/counts.hpp>
 #include <taut/core/report/error.hpp>
 
 namespace taut {

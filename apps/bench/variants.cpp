@@ -1,5 +1,5 @@
-#include <taut/apps/program/bench_body.hpp>
-#include <taut/apps/program/bench_variants.hpp>
+#include <taut/apps/bench/body.hpp>
+#include <taut/apps/bench/variants.hpp>
 #include <taut/core/fem/elastic_tets.hpp>
 #include <taut/materials/elastic.hpp>
 
