@@ -40,7 +40,7 @@ struct ContactRow {
   int kept = 0;        ///< of those, pairs that energies are computed of
   int tets = 0;
   double seconds = 0;       ///< the least of all repetitions
-  double bytes = 0;         ///< that the work must move, see bench_contact_counts.hpp
+  double bytes = 0;         ///< that the work must move, see contact_counts.hpp
   double flops = 0;         ///< that it must do
   double fraction = 0;      ///< of the smaller of both limits; 0 where nothing was counted
   double held = 0;          ///< with "iteration": bytes in arrays of the contact term

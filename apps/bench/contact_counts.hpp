@@ -4,7 +4,7 @@
 // reads and writes of x, p, g and the curvature, once each. Candidates that do not act, and proofs
 // that there are no others, count as loss, except for searches, whose candidates must be written.
 //
-// Flops as in bench_counts.hpp. Closest points count as if all were inside a triangle or inside
+// Flops as in counts.hpp. Closest points count as if all were inside a triangle or inside
 // both edges (75); those at ends and edges cost more. Two contacts of three are of edges, and have
 // a mollifier that does not act (21).
 #pragma once
@@ -20,7 +20,7 @@ struct ContactSizes {
   double contacts;
 };
 
-/// Of the whole sweep `kernel` (bench_contact.hpp); nothing for what is not counted.
+/// Of the whole sweep `kernel` (contact.hpp); nothing for what is not counted.
 SweepCounts count_contact(std::string_view kernel, std::string_view precision,
                           ContactSizes const& sizes);
 

@@ -21,15 +21,6 @@ constexpr int times_b = 3 * times3 + 9;
 /// A squared 12-vector, scaled and added.
 constexpr int squares = 3 * 12;
 
-/// What a model needs beyond what all have in common.
-struct ModelCounts {
-  int state;     ///< at F, for stress and curvature
-  int stress;    ///< P, of its terms
-  int diagonal;  ///< b_a' (d2Psi/dF2) b_a beyond the isotropic term
-  int form;      ///< dF : d2Psi/dF2 : dF beyond the isotropic term
-  int change;    ///< Psi(F) - Psi(F - dF), from F, the state and dF
-};
-
 /// Terms of J: their derivatives at most `scalars`, C : dF and F : cof(dF).
 constexpr int j_form = contract9 + 3 + 3 * cross3 + contract9 + 3;
 constexpr int j_diagonal = times_b + squares;
@@ -46,7 +37,9 @@ constexpr int rotation_form = 6 * dot3 + 3 + times3 + dot3 + 2;
 /// quotient 23.
 constexpr int i1_change = 63 + 2 * dot3 + 1 + 26 + 26 + 122 + 23;
 
-ModelCounts counts_of(std::string_view model) {
+}  // namespace
+
+MaterialCounts count_material(std::string_view model) {
   if (model == "arap") {
     return {polar + twist_operator, 18, rotation_diagonal, rotation_form,
             cofactor + i2_change + i1_change + 3};
@@ -66,14 +59,12 @@ ModelCounts counts_of(std::string_view model) {
     return {cofactor + contract9 + 8, 18, 2 * j_diagonal, j_form + contract9 + 3,
             i2_change + j_change + 12};
   }
-  throw Error("bench_counts: the flops of {} are not counted: add them to counts_of", model);
+  throw Error("bench: the flops of {} are not counted: add them to count_material", model);
 }
-
-}  // namespace
 
 ElasticCounts count_elastic(std::string_view model, std::string_view precision,
                             double vertices_per_tet) {
-  ModelCounts const m = counts_of(model);
+  MaterialCounts const m = count_material(model);
   // F; 2 d2 F; P b_a; |b_a|^2 with b_0, scaled; the weight; adding 24 numbers to vertices.
   int const gradient = deformation + m.state + 9 + m.stress + times_b + (9 + 4 * dot3 + 4) +
                        m.diagonal + 3 + 12 + 24;

@@ -27,6 +27,18 @@ struct ElasticCounts {
   SweepCounts iteration;       ///< of PNCG with Jacobi and a check of sufficient decrease
 };
 
+/// Flops at a deformation gradient F.
+struct MaterialCounts {
+  int state;     ///< for stress and curvature
+  int stress;    ///< P, of its terms
+  int diagonal;  ///< b_a' (d2Psi/dF2) b_a beyond the isotropic term
+  int form;      ///< dF : d2Psi/dF2 : dF beyond the isotropic term
+  int change;    ///< Psi(F) - Psi(F - dF), from F, the state and dF
+};
+
+/// Throws Error for a model that has not been counted.
+MaterialCounts count_material(std::string_view model);
+
 /// `precision`: fp32, mixed or fp64. Throws Error for a model that has not been counted.
 ElasticCounts count_elastic(std::string_view model, std::string_view precision,
                             double vertices_per_tet);

@@ -24,9 +24,9 @@ struct BenchRow {
   std::string precision;
   int threads = 0;
   int tets = 0;
-  std::string kernel;     ///< "gradient", "quadratic_form", "iteration"; see bench_variants.hpp
+  std::string kernel;     ///< "gradient", "quadratic_form", "iteration"; see variants.hpp
   double ns_per_tet = 0;  ///< the least of all repetitions
-  double bytes = 0;       ///< per tet, see bench_counts.hpp
+  double bytes = 0;       ///< per tet, see counts.hpp
   double flops = 0;       ///< per tet
   double fraction = 0;    ///< of the smaller of both limits
   double held = 0;        ///< with "iteration": bytes per tet in fields and tables of the solver

@@ -2,6 +2,7 @@
 // benches.
 #include <taut/apps/bench/contact.hpp>
 #include <taut/apps/bench/elastic.hpp>
+#include <taut/apps/bench/hot.hpp>
 #include <taut/apps/program/command_line.hpp>
 
 #include <fmt/core.h>
@@ -14,7 +15,8 @@ using namespace taut;
 /// What all benches take.
 template <class Options>
 void add_bench(CLI::App& command, Options& options, std::string const& quick) {
-  add_list(command, "--precisions", options.precisions, "fp32, mixed, fp64");
+  if constexpr (requires { options.precisions; })
+    add_list(command, "--precisions", options.precisions, "fp32, mixed, fp64");
   command.add_option("--seconds", options.seconds, "spent on each number")->capture_default_str();
   command.add_flag("--json", options.json, "a JSON list of rows");
   command.add_flag("--quick", options.quick, quick);
@@ -48,6 +50,13 @@ int main(int argc, char** argv) {
             "a small scene and haste, where --contacts and --seconds say nothing");
   contact_app->footer("example: taut bench contact --contacts 100000 --threads 2");
   contact_app->callback([&] { command = [&] { return bench_contact_command(contact_bench); }; });
+
+  HotBenchOptions hot;
+  auto* hot_app = app.add_subcommand("hot", "transfers, sweeps and cycles of material points");
+  add_list(*hot_app, "--cells", hot.cells, "cells along an edge of the cube");
+  add_bench(*hot_app, hot, "a small grid and haste, where --cells and --seconds say nothing");
+  hot_app->footer("example: taut bench hot --cells 32 --threads 1");
+  hot_app->callback([&] { command = [&] { return bench_hot_command(hot); }; });
 
   if (auto const message = unknown_command(app.get_name(), commands_of(app), argc, argv)) {
     fmt::print(stderr, "taut: {}\n", *message);

@@ -28,7 +28,7 @@ TEST_CASE("help has the program's name and an example everywhere", "[cli]") {
   says("--help", 0, "example: taut run");
   says("--version", 0, "taut 0.");
   for (std::string const command : {"run", "scenes", "methods", "check", "plan", "chart", "render",
-                                    "bench", "bench elastic", "bench contact"}) {
+                                    "bench", "bench elastic", "bench contact", "bench hot"}) {
     says(command + " --help", 0, "Usage: taut " + command);
     says(command + " --help", 0, "example: taut " + command);
   }
