@@ -22,20 +22,26 @@ std::vector<Contestant> contestants(std::filesystem::path const& scene, SceneCha
   return all;
 }
 
-std::string describe(Scene const& scene, SceneGeometry const& geometry) {
+std::string describe(Scene const& scene, std::string const& size,
+                     std::vector<MaterialParameters> const& of) {
   std::vector<std::string> materials;  // copies of an object have one each
-  for (MaterialParameters const& m : geometry.materials) {
+  for (MaterialParameters const& m : of) {
     std::string text = fmt::format("{} (E = {:g} Pa, nu = {:g})", m.model, m.young, m.poisson);
     if (std::find(materials.begin(), materials.end(), text) == materials.end())
       materials.push_back(std::move(text));
   }
   constexpr char const* schemes[] = {"implicit Euler", "BDF2", "quasi-static"};
   return fmt::format(
-      "# scene = {}\n# tets = {}\n# vertices = {}\n# materials = {}\n# integrator = {}\n"
-      "# step_s = {:g}\n# threads = {}\n",
-      scene.name, geometry.mesh.tets.size(), geometry.mesh.points.size(),
-      fmt::join(materials, ", "), schemes[static_cast<int>(scene.scheme)], scene.step,
-      Kokkos::DefaultExecutionSpace().concurrency());
+      "# scene = {}\n{}# materials = {}\n# integrator = {}\n# step_s = {:g}\n# threads = {}\n",
+      scene.name, size, fmt::join(materials, ", "), schemes[static_cast<int>(scene.scheme)],
+      scene.step, Kokkos::DefaultExecutionSpace().concurrency());
+}
+
+std::string describe(Scene const& scene, SceneGeometry const& geometry) {
+  return describe(scene,
+                  fmt::format("# tets = {}\n# vertices = {}\n", geometry.mesh.tets.size(),
+                              geometry.mesh.points.size()),
+                  geometry.materials);
 }
 
 std::string describe_target(ChartOptions const& options) {
@@ -89,7 +95,11 @@ int chart_command(ChartOptions const& options) {
   if (options.stability && !(options.methods.empty() && options.frames.empty())) {
     throw Error("--stability takes --policies instead of --methods and --frame");
   }
-  std::vector<ChartMethod> const methods = parse_methods(options.methods);
+  bool const particles = load_scene(scene, options.scene.changes).particles.has_value();
+  if (particles && options.stability) {
+    throw Error("--stability is of policies of contact, which material points do not have");
+  }
+  std::vector<ChartMethod> const methods = parse_methods(options.methods, particles);
   // A folder that cannot be written shows now and not when all is measured.
   std::filesystem::path const probe = out / ".taut";
   write_file_atomically(probe, "");

@@ -1,6 +1,5 @@
+#include <taut/apps/program/chart_scene.hpp>
 #include <taut/apps/program/chart_table.hpp>
-#include <taut/apps/program/chart_trace.hpp>
-#include <taut/apps/program/memory.hpp>
 #include <taut/core/report/error.hpp>
 
 #include <algorithm>
@@ -10,6 +9,10 @@ namespace {
 
 /// What contact is worth in iterations: the same bodies pass through each other and obstacles.
 Scene without_contact(Scene scene) {
+  if (scene.particles) {
+    throw Error("--without-contact: {} is of material points, which meet through their grid: {}",
+                scene.name, "leave it out");
+  }
   for (SceneObstacle const& obstacle : scene.obstacles) {
     if (!obstacle.is_surface()) continue;
     throw Error("--without-contact: {} is a mesh, whose vertices are in the state of the scene: {}",
@@ -45,49 +48,44 @@ private:
   void run(std::filesystem::path const& file) {
     Scene const scene = load_scene(file, options_.scene.changes);
     std::vector<Contestant> const all = load_contestants(file);
-    SceneGeometry const geometry = build_within_memory(scene);
+    std::unique_ptr<ChartScene> const steps = make_chart_scene(file, options_.scene.changes);
     header_ += header_.empty()
-                   ? "# kind = comparison\n" + describe(scene, geometry) + describe_target(options_)
+                   ? "# kind = comparison\n" + steps->description() + describe_target(options_)
                    : fmt::format("# with = {}\n", scene.name);
     std::vector<int> frames = options_.frames;
     if (frames.empty()) frames = {std::min(10, scene.frames)};
 
     std::vector<Contestant> alone;
-    SceneGeometry alone_geometry;
-    std::unique_ptr<Simulation> alone_reference;
+    std::unique_ptr<ChartScene> steps_alone;
     if (options_.without_contact) {
       for (Contestant const& one : all) alone.push_back({one.label, without_contact(one.scene)});
-      alone_geometry = build_within_memory(alone.front().scene);
-      alone_reference = Simulation::create(
-          without_contact(reference_scene(file, options_.scene.changes)), alone_geometry);
+      steps_alone = make_chart_scene(file, options_.scene.changes, without_contact);
     }
-    Reference reference(file, options_.scene.changes, geometry);
     for (int frame : frames) {
-      ReferenceStep const step = reference.advance_to(frame);
-      compare(scene.name, scene, geometry, all, step);
-      if (!alone_reference) continue;
-      compare(scene.name + " without contact", alone.front().scene, alone_geometry, alone,
-              solve_reference(*alone_reference, step.before, frame));
+      ReferenceStep const step = steps->advance_to(frame);
+      compare(scene.name, *steps, all, step);
+      if (!steps_alone) continue;
+      compare(scene.name + " without contact", *steps_alone, alone,
+              steps_alone->solve(step.before, frame));
     }
   }
 
-  void compare(std::string const& name, Scene const& scene, SceneGeometry const& geometry,
-               std::vector<Contestant> const& all, ReferenceStep const& step) {
-    StepMeasure const measure(scene, geometry, step.step, step.start, step.solution,
-                              options_.length);
-    describe_step(name, step, measure);
+  void compare(std::string const& name, ChartScene const& scene, std::vector<Contestant> const& all,
+               ReferenceStep const& step) {
+    std::unique_ptr<StepMeasure> const measure = scene.measure(step, options_.length);
+    describe_step(name, step, *measure);
     fmt::print(
-        "{} step {}: {} tets{}; errors relative to {:.4g} m; reference after {} iterations, "
-        "its last one moved {:.1e}\n",
-        name, step.step, geometry.mesh.tets.size(),
+        "{} step {}: {}{}; errors relative to {:.4g} m; reference after {} iterations, its last "
+        "one moved {:.1e}\n",
+        name, step.step, scene.size(),
         step.contact ? fmt::format(", {} pairs in contact", step.contact->contacts) : "",
-        measure.length(), step.iterations, step.last_move / measure.length());
+        measure->length(), step.iterations, step.last_move / measure->length());
     fmt::print("{:<26} {:>10} {:>10} {:>11} {:>11} {:>11}  ended\n", "",
                fmt::format("to {:g}", options_.target), "seconds", "frames/s", "last error",
                "iterations");
     for (Contestant const& one : all) {
-      auto const simulation = Simulation::create(one.scene, geometry);
-      Trace const found = trace(*simulation, step, measure,
+      auto const simulation = scene.contestant(one.scene);
+      Trace const found = trace(*simulation, step, *measure,
                                 {options_.lowest, options_.max_seconds, options_.repetitions});
       add_rows(fmt::format("{},{},{}", name, step.step, one.label), found);
       say(one.label, found);

@@ -32,7 +32,7 @@ double energy_scale(Scene const& scene, int step) {
 
 }  // namespace
 
-StepMeasure::StepMeasure(Scene const& scene, SceneGeometry const& geometry, int step,
+MeshMeasure::MeshMeasure(Scene const& scene, SceneGeometry const& geometry, int step,
                          std::vector<Point> const& before, std::vector<Point> solution,
                          std::optional<double> length)
     : geometry_(geometry),
@@ -60,15 +60,15 @@ StepMeasure::StepMeasure(Scene const& scene, SceneGeometry const& geometry, int 
   unit_energy_ = energy_above(before);
 }
 
-double StepMeasure::position_error(std::vector<Point> const& x) const {
+double MeshMeasure::position_error(std::vector<Point> const& x) const {
   return largest_distance(x, solution_) / length_;
 }
 
-double StepMeasure::energy_gap(std::vector<Point> const& x) const {
+double MeshMeasure::energy_gap(std::vector<Point> const& x) const {
   return contact_ ? std::numeric_limits<double>::quiet_NaN() : energy_above(x) / unit_energy_;
 }
 
-Mat3<double> StepMeasure::gradient(std::int32_t tet, std::vector<Point> const& x) const {
+Mat3<double> MeshMeasure::gradient(std::int32_t tet, std::vector<Point> const& x) const {
   Tet const& v = geometry_.mesh.tets[tet];
   Mat3<double> edges;
   for (int a = 0; a < 3; ++a)
@@ -77,7 +77,7 @@ Mat3<double> StepMeasure::gradient(std::int32_t tet, std::vector<Point> const& x
 }
 
 template <class Model>
-double StepMeasure::strain_energy_above(Part const& part, std::vector<Point> const& x) const {
+double MeshMeasure::strain_energy_above(Part const& part, std::vector<Point> const& x) const {
   double sum = 0;
   for (std::int32_t t : part.tets) {
     MaterialParameters const& material = geometry_.materials[geometry_.material_of_tet[t]];
@@ -91,7 +91,7 @@ double StepMeasure::strain_energy_above(Part const& part, std::vector<Point> con
   return sum;
 }
 
-double StepMeasure::energy_above(std::vector<Point> const& x) const {
+double MeshMeasure::energy_above(std::vector<Point> const& x) const {
   double strain = 0, inertia = 0;
   for (Part const& part : parts_) {
     strain += ElasticModels::with(

@@ -18,20 +18,29 @@ namespace taut {
 
 class StepMeasure {
 public:
+  virtual ~StepMeasure() = default;
+  virtual double length() const = 0;  ///< m, what errors of position are relative to
+  virtual double position_error(std::vector<Point> const& x) const = 0;
+  /// (E(x) - E(x*)) / (E(before) - E(x*)); NaN where it is not defined.
+  virtual double energy_gap(std::vector<Point> const& x) const = 0;
+};
+
+/// Of a step of meshes.
+class MeshMeasure final : public StepMeasure {
+public:
   /// `before` and `solution`: positions at the beginning of step number `step` (from 1) and its
   /// over-solved end. Errors of position are relative to `length` (m) or, by default, to the
   /// largest motion in the step. Keeps a reference to `geometry`. Throws Error if nothing moves in
   /// the step.
-  StepMeasure(Scene const& scene, SceneGeometry const& geometry, int step,
+  MeshMeasure(Scene const& scene, SceneGeometry const& geometry, int step,
               std::vector<Point> const& before, std::vector<Point> solution,
               std::optional<double> length = {});
 
-  double length() const { return length_; }  ///< m
-
+  double length() const override { return length_; }
   /// max_i |x_i - x*_i| / length
-  double position_error(std::vector<Point> const& x) const;
-  /// (E(x) - E(x*)) / (E(before) - E(x*)); NaN where E is not defined, and with contact.
-  double energy_gap(std::vector<Point> const& x) const;
+  double position_error(std::vector<Point> const& x) const override;
+  /// NaN with contact.
+  double energy_gap(std::vector<Point> const& x) const override;
   /// E(x) - E(x*), kg m^2, without what contact adds to it.
   double energy_above(std::vector<Point> const& x) const;
 

@@ -1,5 +1,6 @@
 #include <taut/apps/program/chart_method.hpp>
 #include <taut/apps/program/methods.hpp>
+#include <taut/apps/program/particle_methods.hpp>
 #include <taut/core/report/error.hpp>
 
 #include <algorithm>
@@ -7,10 +8,28 @@
 
 namespace taut {
 
-ChartMethod parse_method(std::string const& text) {
+namespace {
+
+/// Those of a kind of scenes; the first of a name counts.
+std::vector<MethodTitle> titles_of(bool particles) {
+  auto const of_meshes = method_titles();
+  if (!particles) return {of_meshes.begin(), of_meshes.end()};
+  auto const own = particle_method_titles();
+  std::vector<MethodTitle> all(own.begin(), own.end());
+  for (MethodTitle const& title : of_meshes) {
+    bool const known = std::any_of(own.begin(), own.end(),
+                                   [&](MethodTitle const& t) { return t.name == title.name; });
+    if (!known) all.push_back(title);
+  }
+  return all;
+}
+
+}  // namespace
+
+ChartMethod parse_method(std::string const& text, bool particles) {
   std::size_t end = std::min(text.find(':'), text.size());
   std::string const name = text.substr(0, end);
-  auto const titles = method_titles();
+  auto const titles = titles_of(particles);
   auto const title = std::find_if(titles.begin(), titles.end(),
                                   [&](MethodTitle const& t) { return t.name == name; });
   if (title == titles.end()) {
@@ -38,16 +57,17 @@ ChartMethod parse_method(std::string const& text) {
   return method;
 }
 
-std::vector<ChartMethod> parse_methods(std::vector<std::string> const& texts) {
+std::vector<ChartMethod> parse_methods(std::vector<std::string> const& texts, bool particles) {
   std::vector<ChartMethod> methods;
   auto const add = [&](std::string const& text) {
-    methods.push_back(parse_method(text));
+    methods.push_back(parse_method(text, particles));
     for (std::size_t i = 0; i + 1 < methods.size(); ++i)
       if (methods[i].label == methods.back().label)
         throw Error("--methods: {} is named twice: drop one", text);
   };
   if (texts.empty() || (texts.size() == 1 && texts[0] == "all")) {
-    for (MethodTitle const& title : method_titles()) add(std::string(title.name));
+    for (MethodTitle const& title : particles ? particle_method_titles() : method_titles())
+      add(std::string(title.name));
   } else {
     for (std::string const& text : texts) add(text);
   }

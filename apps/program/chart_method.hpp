@@ -14,13 +14,15 @@ struct ChartMethod {
   std::vector<std::string> overrides;  ///< of the scene: "solver.method=dk", ...
 };
 
-/// Reads "dk:preconditioner=jacobi:precision=mixed". Throws Error for a method that does not exist;
-/// keys and values are checked where the scene is loaded.
-ChartMethod parse_method(std::string const& text);
+/// Reads "dk:preconditioner=jacobi:precision=mixed". Throws Error for a method that does not exist
+/// for meshes or, where the scene is of those, for material points; keys and values are checked
+/// where the scene is loaded.
+ChartMethod parse_method(std::string const& text, bool particles = false);
 
-/// All of them; empty or "all" stands for every method of the program. Throws Error for one that is
-/// named twice.
-std::vector<ChartMethod> parse_methods(std::vector<std::string> const& texts);
+/// All of them; empty or "all" stands for every method of the program, of material points for those
+/// that only these have. Throws Error for one that is named twice.
+std::vector<ChartMethod> parse_methods(std::vector<std::string> const& texts,
+                                       bool particles = false);
 
 /// `changes` followed by `more` overrides, the later ones winning.
 SceneChanges with(SceneChanges changes, std::span<std::string const> more);

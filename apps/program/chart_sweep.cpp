@@ -1,6 +1,5 @@
+#include <taut/apps/program/chart_scene.hpp>
 #include <taut/apps/program/chart_table.hpp>
-#include <taut/apps/program/chart_trace.hpp>
-#include <taut/apps/program/memory.hpp>
 #include <taut/core/report/error.hpp>
 
 #include <algorithm>
@@ -28,22 +27,21 @@ std::string sweep_methods(std::filesystem::path const& file, ChartOptions const&
     std::vector<std::string> const member{fmt::format("{}={}", whole.sweep->key, value)};
     SceneChanges const changes = with(options.scene.changes, member);
     std::vector<Contestant> const all = contestants(file, changes, methods, options.max_iterations);
-    Scene const scene = load_scene(file, changes);
-    SceneGeometry const geometry = build_within_memory(scene);
+    std::unique_ptr<ChartScene> const scene = make_chart_scene(file, changes);
     if (header.empty()) {
-      header = "# kind = sweep\n" + describe(scene, geometry) + describe_target(options) +
+      header = "# kind = sweep\n" + scene->description() + describe_target(options) +
                fmt::format("# key = {}\n# frame = {}\n", whole.sweep->key, frame);
     }
-    ReferenceStep const step = Reference(file, changes, geometry).advance_to(frame);
-    StepMeasure const measure(scene, geometry, frame, step.start, step.solution, length);
-    length = measure.length();
+    ReferenceStep const step = scene->advance_to(frame);
+    std::unique_ptr<StepMeasure> const measure = scene->measure(step, length);
+    length = measure->length();
     if (value == whole.sweep->values.front()) {
-      header += fmt::format("# length_m = {:.6g}\n", measure.length());
+      header += fmt::format("# length_m = {:.6g}\n", measure->length());
     }
-    fmt::print("{}, step {}: errors relative to {:.4g} m\n", member[0], frame, measure.length());
+    fmt::print("{}, step {}: errors relative to {:.4g} m\n", member[0], frame, measure->length());
     for (Contestant const& one : all) {
-      auto const simulation = Simulation::create(one.scene, geometry);
-      Trace const found = trace(*simulation, step, measure, limits);
+      auto const simulation = scene->contestant(one.scene);
+      Trace const found = trace(*simulation, step, *measure, limits);
       auto const reached = found.reached(options.target);
       double const last = found.points.empty() ? std::numeric_limits<double>::quiet_NaN()
                                                : found.points.back().position_error;

@@ -22,7 +22,9 @@ struct Contestant {
 std::vector<Contestant> contestants(std::filesystem::path const& scene, SceneChanges const& changes,
                                     std::vector<ChartMethod> const& methods, int max_iterations);
 
-/// What every chart says about its scene and machine.
+/// What every chart says about its scene and machine; `size`: lines about its discretisation.
+std::string describe(Scene const& scene, std::string const& size,
+                     std::vector<MaterialParameters> const& materials);
 std::string describe(Scene const& scene, SceneGeometry const& geometry);
 
 /// The error that counts as solved, and what errors of position are relative to.

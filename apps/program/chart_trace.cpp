@@ -4,7 +4,6 @@
 #include <taut/core/report/timer.hpp>
 
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <limits>
 
@@ -14,7 +13,6 @@ namespace {
 std::vector<std::string> const reference_solver{"solver.method=newton",
                                                 "solver.precision=fp64",
                                                 "solver.line_search=newton_armijo",
-                                                "solver.preconditioner=block_jacobi",
                                                 "solver.refresh=always",
                                                 "solver.stopping=decrement_window",
                                                 "solver.tolerance=1e-12",
@@ -102,25 +100,11 @@ void take_time(Trace& trace, Simulation& simulation) {
 }  // namespace
 
 Scene reference_scene(std::filesystem::path const& scene, SceneChanges const& changes) {
-  return load_scene(scene, with(changes, reference_solver));
-}
-
-Reference::Reference(std::filesystem::path const& scene, SceneChanges const& changes,
-                     SceneGeometry const& geometry)
-    : lead_(Simulation::create(
-          load_scene(scene, with(changes, std::array{std::string("solver.precision=fp64")})),
-          geometry)),
-      simulation_(Simulation::create(reference_scene(scene, changes), geometry)) {}
-
-ReferenceStep Reference::advance_to(int step) {
-  if (step <= last_) {
-    throw Error("--frame {}: name frames from 1 on, each once, in ascending order", step);
-  }
-  last_ = step;
-  while (lead_->steps() + 1 < step) lead_->step();
-  Checkpoint before;
-  lead_->save(before);
-  return solve_reference(*simulation_, before, step);
+  bool const particles = load_scene(scene, changes).particles.has_value();
+  std::vector<std::string> solver = reference_solver;
+  solver.push_back(particles ? "solver.preconditioner=multigrid"
+                             : "solver.preconditioner=block_jacobi");
+  return load_scene(scene, with(changes, solver));
 }
 
 ReferenceStep solve_reference(Simulation& simulation, Checkpoint const& before, int step) {

@@ -10,31 +10,14 @@ namespace taut {
 
 /// A step of a scene: the state that every method starts from, and where it should end.
 struct ReferenceStep {
-  int step;                  ///< number, from 1
+  int step;                  ///< number, from 1; of material points, of the frame that it begins
   Checkpoint before;         ///< fp64
-  std::vector<Point> start;  ///< positions in `before`
+  std::vector<Point> start;  ///< positions in `before`; of material points, of the nodes at rest
   std::vector<Point> solution;
   int iterations;
   Stop stop;
   double last_move;  ///< m, of the reference's last iteration: what it can tell apart
   std::optional<ContactReport> contact;  ///< at the solution
-};
-
-/// The scene brought to a step by its own solver in fp64, and that step solved by projected Newton
-/// in fp64 until no more can be gained.
-class Reference {
-public:
-  /// `changes` choose the scene. `geometry` is that of the scene.
-  Reference(std::filesystem::path const& scene, SceneChanges const& changes,
-            SceneGeometry const& geometry);
-
-  /// Takes steps up to number `step` and solves that. Throws Error if it is not ahead of the last
-  /// one, or if the reference itself does not converge.
-  ReferenceStep advance_to(int step);
-
-private:
-  std::unique_ptr<Simulation> lead_, simulation_;
-  int last_ = 0;
 };
 
 /// The scene with its solver replaced by that of the reference.

@@ -48,12 +48,7 @@ public:
                  Flows(start.flows)) {}
 
   NewtonReport step(IterationObserver const& observer) override {
-    Observer<P, S> inner;
-    if (observer) {
-      inner = [&](Iteration<P, S> const& i) {
-        observer({i.index, i.energy_change_so_far, i.error_estimate, [&] { return read(i.x); }});
-      };
-    }
+    Observer<P, S> const inner = observer_of(observer);
     double const end = (steps_ + 1) * scene_.step;
     NewtonReport all;
     frame_ = {};
@@ -69,6 +64,15 @@ public:
     }
     ++steps_;
     return all;
+  }
+
+  NewtonReport first_step(IterationObserver const& observer) override {
+    return step_of_grid((steps_ + 1) * scene_.step, observer_of(observer)).minimiser;
+  }
+  NodesOfStep nodes() const override { return nodes_at(stepper_.nodes().x); }
+  NodesOfStep start_nodes() override {
+    grid_.rebuild(particles_, potential_.template term<ParticleTerms>().material_count());
+    return nodes_at(grid_.rest());
   }
 
   double time() const override { return time_; }
@@ -163,6 +167,19 @@ private:
     auto const& unknowns = grid_.unknowns();
     return ParticlePotential(unknowns, Inertia<P>(unknowns),
                              BodyForce<P>(unknowns, {g[0], g[1], g[2]}), terms, Slip<P>());
+  }
+  static Observer<P, S> observer_of(IterationObserver const& observer) {
+    if (!observer) return {};
+    return [&observer](Iteration<P, S> const& i) {
+      observer({i.index, i.energy_change_so_far, i.error_estimate, [&] { return read(i.x); }});
+    };
+  }
+  NodesOfStep nodes_at(VectorField<P::position, S> const& x) const {
+    NodesOfStep nodes{read(x), {}};
+    auto const mass =
+        Kokkos::create_mirror_view_and_copy(Kokkos::HostSpace(), grid_.unknowns().mass);
+    nodes.mass.assign(mass.data(), mass.data() + mass.extent(0));
+    return nodes;
   }
   /// Friction takes its forces from the minimisation before.
   Lagging lagging() const {

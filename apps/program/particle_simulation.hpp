@@ -16,6 +16,12 @@ struct ParticleFrame {
   double travel_cells = 0;  ///< the farthest that a particle went in a step of the grid (a bound)
 };
 
+/// The nodes of a step of the grid.
+struct NodesOfStep {
+  std::vector<Point> x;      ///< m
+  std::vector<double> mass;  ///< kg
+};
+
 class ParticleSimulation : public Simulation {
 public:
   /// Throws Error if the scene asks for what does not exist.
@@ -25,6 +31,13 @@ public:
   /// Of the frame that ended last.
   virtual ParticleFrame const& frame() const = 0;
   virtual std::vector<Particle> particles() const = 0;
+
+  /// The first step of the grid that the next frame takes, for charts; what comes after it is not
+  /// taken, and the frame is not counted.
+  virtual NewtonReport first_step(IterationObserver const& observer) = 0;
+  /// Of the step that was taken last; and at rest, of that to come.
+  virtual NodesOfStep nodes() const = 0;
+  virtual NodesOfStep start_nodes() = 0;
   /// Of each point of the scene's result (result_mesh), in the order of particle_scalars().
   virtual std::vector<std::vector<double>> scalars() const = 0;
 };

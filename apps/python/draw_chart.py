@@ -306,7 +306,8 @@ def draw_stability(facts, rows):
 
 
 def describe(facts):
-    text = "" if "with" in facts else f"{int(facts['tets']):,} tets, "
+    size = next(name for name in ("tets", "particles") if name in facts)
+    text = "" if "with" in facts else f"{int(facts[size]):,} {size}, "
     text += (f"{facts['materials']}, {facts['integrator']} with {facts['step_s']} s, "
              f"{facts['threads']} thread{'' if facts['threads'] == '1' else 's'}.  ")
     if facts["kind"] == "stability":

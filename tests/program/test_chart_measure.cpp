@@ -45,7 +45,7 @@ TEST_CASE("the energy gap is what a minimiser still has to lose", "[chart]") {
   });
   REQUIRE(iterates.size() >= 3);
   // The last iterate is exact far beyond the margin below.
-  StepMeasure const measure(scene, geometry, before_that + 1, before, simulation->positions());
+  MeshMeasure const measure(scene, geometry, before_that + 1, before, simulation->positions());
   double const lost = change.front() - change.back();
   REQUIRE(lost > 0);
   for (std::size_t k = 0; k + 1 < iterates.size(); ++k) {
@@ -65,7 +65,7 @@ TEST_CASE("both measures are one at the beginning of the step", "[chart]") {
   simulation->step();
   std::vector<Point> const solution = simulation->positions();
 
-  StepMeasure const measure(scene, geometry, 1, before, solution);
+  MeshMeasure const measure(scene, geometry, 1, before, solution);
   CHECK(measure.position_error(before) == 1);
   CHECK(measure.position_error(solution) == 0);
   CHECK(measure.energy_gap(before) == 1);
@@ -78,10 +78,10 @@ TEST_CASE("both measures are one at the beginning of the step", "[chart]") {
   CHECK_THAT(measure.position_error(half), WithinRel(0.5, 1e-9));
   CHECK_THAT(measure.energy_gap(half), WithinRel(0.25, 0.02));
 
-  StepMeasure const absolute(scene, geometry, 1, before, solution, 2.0);
+  MeshMeasure const absolute(scene, geometry, 1, before, solution, 2.0);
   CHECK_THAT(absolute.position_error(half), WithinRel(measure.length() / 4, 1e-9));
 
   half[3][1] = std::numeric_limits<double>::quiet_NaN();
   CHECK(std::isnan(measure.position_error(half)));
-  CHECK_THROWS_AS(StepMeasure(scene, geometry, 1, before, before), Error);
+  CHECK_THROWS_AS(MeshMeasure(scene, geometry, 1, before, before), Error);
 }

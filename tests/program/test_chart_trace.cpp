@@ -55,7 +55,7 @@ struct Stage {
   SceneGeometry geometry = build_geometry(scene);
   Scripted simulation;
   ReferenceStep reference;
-  StepMeasure measure;
+  MeshMeasure measure;
 
   Stage() : reference(make_reference()), measure(make_measure()) {}
   ReferenceStep make_reference() {
@@ -69,8 +69,8 @@ struct Stage {
     simulation.solution = made.solution;
     return made;
   }
-  StepMeasure make_measure() const {
-    return StepMeasure(scene, geometry, 3, reference.start, reference.solution);
+  MeshMeasure make_measure() const {
+    return MeshMeasure(scene, geometry, 3, reference.start, reference.solution);
   }
 };
 
