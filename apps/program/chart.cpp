@@ -83,11 +83,18 @@ int chart_command(ChartOptions const& options) {
     throw Error("{}: a chart is there already: choose another --out or replace it with --force",
                 out.string());
   }
-  if (options.sweep && options.stability) throw Error("--sweep and --stability: choose one");
-  bool const compares = !options.sweep && !options.stability;
-  if (!compares && (!options.with.empty() || options.without_contact)) {
+  if (options.sweep + options.stability + options.totals > 1)
+    throw Error("--sweep, --stability and --totals: choose one");
+  bool const compares = !options.sweep && !options.stability && !options.totals;
+  if ((!options.with.empty() && !compares && !options.totals) ||
+      (options.without_contact && !compares)) {
     throw Error("--with and --without-contact are of a comparison: leave out --{}",
-                options.sweep ? "sweep" : "stability");
+                options.sweep       ? "sweep"
+                : options.stability ? "stability"
+                                    : "totals");
+  }
+  if (options.totals && !options.frames.empty()) {
+    throw Error("--totals takes whole scenes: shorten them by --set time.frames=N, not by --frame");
   }
   if (!options.stability && !options.policies.empty()) {
     throw Error("--policies are what --stability compares: add it, or name --methods");
@@ -105,6 +112,7 @@ int chart_command(ChartOptions const& options) {
   write_file_atomically(probe, "");
   std::filesystem::remove(probe);
   std::string const table = options.stability ? stability_of_policies(scene, options)
+                            : options.totals  ? totals_of_methods(scene, options, methods)
                             : options.sweep   ? sweep_methods(scene, options, methods)
                                               : compare_methods(scene, options, methods);
   write_file_atomically(data, table);

@@ -4,8 +4,8 @@
 // for every method, preconditioner and stiffness.
 //
 // With `sweep`, the iterations and seconds to an error of `target` against the swept value of the
-// scene. With `stability`, no errors: how far policies of contact bring the scene until a step is
-// not clean.
+// scene. With `totals`, the seconds of whole scenes. With `stability`, no errors: how far policies
+// of contact bring the scene until a step is not clean.
 #pragma once
 
 #include <taut/apps/program/commands.hpp>
@@ -25,6 +25,7 @@ struct ChartOptions {
   bool without_contact = false;   ///< also the same steps, from the same states, without contact
   bool sweep = false;
   bool stability = false;
+  bool totals = false;  ///< whole scenes instead of single steps
   /// Of `stability`: KEY=VALUE[:KEY=VALUE...] of [contact], or of another table as TABLE.KEY; empty
   /// or "all": those of `default_policies`.
   std::vector<std::string> policies;

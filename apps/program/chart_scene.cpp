@@ -49,6 +49,7 @@ public:
   std::string description() const override { return describe(scene_, geometry_); }
   std::string size() const override { return fmt::format("{} tets", geometry_.mesh.tets.size()); }
   ReferenceStep solve(Checkpoint const& before, int step) override {
+    if (!solver_) solver_ = Simulation::create(reference_, geometry_);
     return solve_reference(*solver_, before, step);
   }
   std::unique_ptr<StepMeasure> measure(ReferenceStep const& step,
@@ -56,16 +57,19 @@ public:
     return std::make_unique<MeshMeasure>(scene_, geometry_, step.step, step.start, step.solution,
                                          length);
   }
-  std::unique_ptr<Simulation> contestant(Scene const& scene) const override {
+  std::unique_ptr<Simulation> contestant(Scene const& scene) const override { return whole(scene); }
+  std::unique_ptr<Simulation> whole(Scene const& scene) const override {
     return Simulation::create(scene, geometry_);
   }
 
 private:
-  Simulation& lead() override { return *lead_; }
+  Simulation& lead() override {
+    if (!lead_) lead_ = Simulation::create(lead_scene_, geometry_);
+    return *lead_;
+  }
 
   SceneGeometry geometry_ = build_within_memory(scene_);
-  std::unique_ptr<Simulation> lead_ = Simulation::create(lead_scene_, geometry_);
-  std::unique_ptr<Simulation> solver_ = Simulation::create(reference_, geometry_);
+  std::unique_ptr<Simulation> lead_, solver_;  ///< once they are needed
 };
 
 /// Material points of which a step is the first one of the grid in a frame.
@@ -142,22 +146,29 @@ public:
   }
   std::string size() const override { return fmt::format("{} particles", particles_.list.size()); }
   ReferenceStep solve(Checkpoint const& before, int step) override {
-    return solve_reference(solver_, before, step);
+    if (!solver_) solver_ = std::make_unique<NodesOfParticles>(reference_, particles_);
+    return solve_reference(*solver_, before, step);
   }
   std::unique_ptr<StepMeasure> measure(ReferenceStep const& step,
                                        std::optional<double> length) const override {
-    return std::make_unique<NodeMeasure>(solver_.mass(), step, length);
+    return std::make_unique<NodeMeasure>(solver_->mass(), step, length);
   }
   std::unique_ptr<Simulation> contestant(Scene const& scene) const override {
     return std::make_unique<NodesOfParticles>(scene, particles_);
   }
+  std::unique_ptr<Simulation> whole(Scene const& scene) const override {
+    return ParticleSimulation::create(scene, particles_);
+  }
 
 private:
-  Simulation& lead() override { return *lead_; }
+  Simulation& lead() override {
+    if (!lead_) lead_ = ParticleSimulation::create(lead_scene_, particles_);
+    return *lead_;
+  }
 
   SceneParticles particles_ = build_particles(scene_);
-  std::unique_ptr<ParticleSimulation> lead_ = ParticleSimulation::create(lead_scene_, particles_);
-  NodesOfParticles solver_{reference_, particles_};
+  std::unique_ptr<ParticleSimulation> lead_;
+  std::unique_ptr<NodesOfParticles> solver_;
 };
 
 }  // namespace

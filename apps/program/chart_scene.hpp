@@ -33,6 +33,8 @@ public:
                                                std::optional<double> length) const = 0;
   /// A method's own copy of the scene, whose step is that of the reference.
   virtual std::unique_ptr<Simulation> contestant(Scene const& scene) const = 0;
+  /// The same, whose steps are frames.
+  virtual std::unique_ptr<Simulation> whole(Scene const& scene) const = 0;
 };
 
 /// `change` is applied to every scene that is loaded. Throws Error.

@@ -43,6 +43,14 @@ std::string compare_methods(std::filesystem::path const& scene, ChartOptions con
 std::string sweep_methods(std::filesystem::path const& scene, ChartOptions const& options,
                           std::vector<ChartMethod> const& methods);
 
+/// scene,method,frames,of_frames,seconds,iterations,linear_iterations,converged_frames,error_m,ended:
+/// a row per scene and method, with the whole scene, by the rule that ends its steps. `error_m` is
+/// the largest distance, at the end, from the scene by its own method with a thousandth of its
+/// tolerance. `ended`: "end of scene", "not converged" (some frames), "out of time" or "no step"
+/// (an error).
+std::string totals_of_methods(std::filesystem::path const& scene, ChartOptions const& options,
+                              std::vector<ChartMethod> const& methods);
+
 /// policy,steps,seconds_simulated,turns,inverted_seconds,inverted_turns,iterations,most_contacts,
 /// smallest_gap,seconds,ended,why: a row per policy, up to the last step that was clean: without an
 /// intersection, by the exact test, without an inverted element of a material that forbids it, and

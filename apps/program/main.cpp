@@ -131,6 +131,7 @@ int main(int argc, char** argv) {
   chart_app->add_flag("--without-contact", chart.without_contact,
                       "also the same steps, from the same states, without contact");
   chart_app->add_flag("--sweep", chart.sweep, "time to --target against the scene's [sweep]");
+  chart_app->add_flag("--totals", chart.totals, "the seconds of whole scenes");
   chart_app->add_flag("--stability", chart.stability,
                       "how far --policies bring the scene until a step is not clean");
   add_list(*chart_app, "--policies", chart.policies,

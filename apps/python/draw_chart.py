@@ -305,6 +305,36 @@ def draw_stability(facts, rows):
     return figure, [], []
 
 
+def draw_totals(facts, rows):
+    """Bars per scene: the seconds of each method, with its error; what did not come to the end is pale."""
+    scenes = list(dict.fromkeys(row["scene"] for row in rows))
+    styles = methods_of(rows)
+    figure, grid = plt.subplots(len(scenes), 1, squeeze=False,
+                                figsize=(12, 1.7 + sum(0.5 + 0.32 * len(styles) for _ in scenes)))
+    for axes, scene in zip(grid[:, 0], scenes):
+        mine = [row for row in rows if row["scene"] == scene]
+        for y, row in enumerate(mine):
+            done = row["ended"] == "end of scene"
+            axes.barh(y, row["seconds"], height=0.62, color=styles[row["method"]]["color"],
+                      alpha=0.85 if done else 0.3, lw=0)
+            text = f"{row['iterations'] / max(row['frames'], 1):.0f} iterations a frame"
+            if row["linear_iterations"] > 0:
+                text += f", {row['linear_iterations'] / max(row['frames'], 1):.0f} linear"
+            if math.isfinite(row["error_m"]):
+                text += f", error {1e3 * row['error_m']:.2g} mm"
+            if not done:
+                text = f"{row['ended']}, {row['frames']:.0f} of {row['of_frames']:.0f} frames; " + text
+            axes.annotate(text, (row["seconds"], y), xytext=(6, 0), va="center",
+                          textcoords="offset points", fontsize="small", annotation_clip=False,
+                          path_effects=HALO)
+        axes.set_yticks(range(len(mine)), [row["method"] for row in mine])
+        axes.invert_yaxis()
+        axes.set_title(scene, loc="left", fontsize="medium", color="#666666")
+        axes.grid(axis="y", visible=False)
+    grid[-1, 0].set_xlabel("seconds of the whole scene")
+    return figure, [], []
+
+
 def describe(facts):
     size = next(name for name in ("tets", "particles") if name in facts)
     text = "" if "with" in facts else f"{int(facts[size]):,} {size}, "
@@ -312,6 +342,8 @@ def describe(facts):
              f"{facts['threads']} thread{'' if facts['threads'] == '1' else 's'}.  ")
     if facts["kind"] == "stability":
         return text + "Clean: converged and without an intersection, after every step"
+    if facts["kind"] == "totals":
+        return text + "Errors at the end against a thousandth of the tolerance"
     text += "Errors against projected Newton in fp64"
     if facts["length"] == "motion":
         text += ", in units of the motion in the step"
@@ -323,7 +355,8 @@ def describe(facts):
 def main():
     data, out = sys.argv[1:3]
     facts, rows = read(data)
-    draw = {"sweep": draw_sweep, "comparison": draw_comparison, "stability": draw_stability}[facts["kind"]]
+    draw = {"sweep": draw_sweep, "comparison": draw_comparison, "stability": draw_stability,
+            "totals": draw_totals}[facts["kind"]]
     figure, labels, rated = draw(facts, rows)
     inches = figure.get_size_inches()[1]
     figure.subplots_adjust(left=0.065, right=0.86, wspace=0.5, hspace=0.24, bottom=0.55 / inches,
@@ -334,7 +367,7 @@ def main():
         figure.subplots_adjust(right=0.82, wspace=0.65)
     if rated:
         figure.subplots_adjust(hspace=0.3, top=1 - 1.15 / inches)
-    if facts["kind"] == "stability":
+    if facts["kind"] in ("stability", "totals"):
         figure.subplots_adjust(left=0.22, right=0.7)
     for name in facts.keys() - {"with"}:
         facts[name] = re.sub(r"e\+0?", "e", facts[name])

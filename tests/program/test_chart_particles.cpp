@@ -99,6 +99,26 @@ TEST_CASE("a step of nodes begins at rest and is the same for all", "[chart][mpm
   CHECK_THROWS_MATCHES(scene->advance_to(2), Error, MessageMatches(ContainsSubstring("ascending")));
 }
 
+TEST_CASE("totals run whole scenes, each method by its own rule", "[chart][mpm]") {
+  ScratchFolder const folder;
+  ChartOptions options = options_for(folder, bar);
+  options.frames = {};
+  options.totals = true;
+  options.methods = {"lbfgs", "pn_pcg", "dk:preconditioner=block_jacobi:max_iterations=1"};
+  Data const data = chart(options);
+  REQUIRE(data.rows.size() == 3);
+  for (Row const& row : data.rows) {
+    CAPTURE(row.at("method"));
+    bool const enough = row.at("method") != "DK block_jacobi max_iterations=1";
+    CHECK(row.at("ended") == (enough ? "end of scene" : "not converged"));
+    CHECK(number(row, "frames") == 3);
+    CHECK((number(row, "error_m") < 1e-3) == enough);
+    CHECK((number(row, "linear_iterations") > 0) == (row.at("method") == "PN-PCG"));
+  }
+  options.frames = {1};
+  CHECK_THROWS_MATCHES(chart(options), Error, MessageMatches(ContainsSubstring("time.frames=N")));
+}
+
 TEST_CASE("charts of particles refuse what is of meshes", "[chart][mpm]") {
   ScratchFolder const folder;
   ChartOptions options = options_for(folder, bar);
