@@ -28,13 +28,16 @@ struct PreparePoints {
   KOKKOS_FUNCTION void operator()(int slot) const {
     constexpr int lanes = BlockSweep<S, Real, K, false>::lanes;
     int const p = blocks.particle(slot);
+    // What fills a pack up goes where a particle of it goes: anywhere else a node that hardly any
+    // particle sees could invert it, and no volume times no number is no number.
+    int const like = p >= 0 ? p : blocks.particle(slot / lanes * lanes);
     Real* const to = data.data() + std::size_t(slot / lanes) * point_numbers * lanes + slot % lanes;
     for (int c = 0; c < 3; ++c) {
-      double const x = p >= 0 ? double(particles.x(p, c)) * per_dx : K::start + 0.5;
+      double const x = like >= 0 ? double(particles.x(like, c)) * per_dx : K::start + 0.5;
       to[c * lanes] = static_cast<Real>((x - base_node<K>(x)) - K::start);
     }
     for (int k = 0; k < 9; ++k) {
-      to[(3 + k) * lanes] = p >= 0 ? static_cast<Real>(particles.F(p, k)) : Real(k % 4 == 0);
+      to[(3 + k) * lanes] = like >= 0 ? static_cast<Real>(particles.F(like, k)) : Real(k % 4 == 0);
     }
     to[12 * lanes] =
         p >= 0 ? static_cast<Real>(double(particles.volume(p)) * double(particles.stiffness(p)))

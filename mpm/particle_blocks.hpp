@@ -232,7 +232,7 @@ struct FillPatch {
     to.count(patch) = count;
     for (int k = count; k < counts(patch); ++k) {
       to.particle(slots + k) = -1;
-      to.corner(slots + k) = to.corner(slots);
+      to.corner(slots + k) = to.corner(slots + k / counts.lanes * counts.lanes);
     }
   }
 };
