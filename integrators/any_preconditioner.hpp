@@ -2,6 +2,7 @@
 #pragma once
 
 #include <taut/core/report/error.hpp>
+#include <taut/integrators/holds_hessian.hpp>
 #include <taut/integrators/one_of.hpp>
 #include <taut/integrators/preconditioner.hpp>
 #include <taut/integrators/schwarz.hpp>
@@ -51,6 +52,23 @@ public:
   }
   void apply(Vectors const& g, Vectors const& z) const {
     std::visit([&](auto const& m) { m.apply(g, z); }, chosen_);
+  }
+
+  bool holds_hessian() const requires(HoldsHessian<Ms, Vectors> || ...) {
+    return std::visit(
+        []<class M>(M const& m) {
+          if constexpr (HoldsHessian<M, Vectors>) return bool(m.holds_hessian());
+          return false;
+        },
+        chosen_);
+  }
+  void hessian_product(Vectors const& d, Vectors const& hd) const
+      requires(HoldsHessian<Ms, Vectors> || ...) {
+    std::visit(
+        [&]<class M>(M const& m) {
+          if constexpr (HoldsHessian<M, Vectors>) m.hessian_product(d, hd);
+        },
+        chosen_);
   }
 
 private:

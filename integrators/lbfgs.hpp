@@ -130,6 +130,9 @@ struct LbfgsParams {
   bool newton_step = true;
   /// Without pairs, too, the first step tried is that of the quadratic model; off: the unit step.
   bool newton_first_step = true;
+  /// Pairs are of the metric that they were made with: with a new one they are forgotten (HOT's
+  /// option --adaptiveH). Off, they are kept, which costs fewer iterations.
+  bool forget_when_renewed = false;
   double least_curvature = 1e-8;  ///< pairs are kept if s'y exceeds this times |s'g|
 };
 
@@ -162,7 +165,8 @@ public:
 
   template <class E, class M>
   Heading next(E&, VectorField<typename P::position, S> const&, DescentFields<P, S>& fields,
-               M const& preconditioner, Step const& last, bool) {
+               M const& preconditioner, Step const& last, bool renewed) {
+    if (renewed && params_.forget_when_renewed) restart();
     Heading heading;
     int const slot = restarted_ ? -1 : (newest_ + 1) % params_.window;
     history_.count = std::max(history_.count, slot + 1);

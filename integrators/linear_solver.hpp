@@ -5,6 +5,7 @@
 #include <taut/core/exec/copy.hpp>
 #include <taut/core/sparse/operations.hpp>
 #include <taut/integrators/fields.hpp>
+#include <taut/integrators/holds_hessian.hpp>
 #include <taut/integrators/preconditioner.hpp>
 
 #include <algorithm>
@@ -129,10 +130,13 @@ public:
     reducer_.provide(n, 2);
   }
 
-  /// `product(d, hd)` makes hd = H d; `preconditioner.apply(r, z)` makes z = P r.
+  /// `product(d, hd)` makes hd = H d; `preconditioner.apply(r, z)` makes z = P r. `flexible`: with
+  /// beta = z'(r - r_before) / z_before'r_before (Notay 2000), for a P that is not the same
+  /// operator each time (solves of its own that stop at a tolerance); one more scalar product.
   template <class Product, class M>
   LinearReport solve(Product const& product, M const& preconditioner, Vectors const& b,
-                     LinearTolerance const& tolerance, int max_iterations, Vectors const& p) const {
+                     LinearTolerance const& tolerance, int max_iterations, Vectors const& p,
+                     bool flexible = false) const {
     int const n = static_cast<int>(b.extent(0));
     assign_on<S>(p, Real(0));
     assign_on<S>(r_, b);
@@ -171,7 +175,8 @@ public:
       preconditioner.apply(r_, z_);
       double const before = r_P_r;
       r_P_r = dot(r_, z_);
-      double const beta = r_P_r / before;
+      // What r has changed by is -alpha H d.
+      double const beta = (flexible ? -alpha * dot(z_, hd_) : r_P_r) / before;
       d_Pinv_d = r_P_r + beta * beta * d_Pinv_d;
       for_each<S>("cg_turn", n, kernels::ConjugateTurn<P, S>{d_, z_, Real(beta)});
     }
@@ -252,7 +257,8 @@ public:
   }
 };
 
-/// Conjugate gradients as a policy of minimisers.
+/// Conjugate gradients as a policy of minimisers. A preconditioner that holds the Hessian of the
+/// iterate lends it.
 template <class P, class S, template <class, class> class Hessian>
 class Pcg {
 public:
@@ -260,6 +266,7 @@ public:
 
   struct Params {
     int max_iterations = 2000;
+    bool flexible = false;  ///< see ConjugateGradients
   };
   Pcg() : Pcg(Params()) {}
   explicit Pcg(Params const& params) : params_(params) {}
@@ -272,11 +279,17 @@ public:
   template <class E, class M>
   LinearReport solve(E& e, VectorField<typename P::position, S> const& x, Vectors const& b,
                      M const& preconditioner, LinearTolerance const& tolerance, Vectors const& p) {
-    hessian_.update(e, x);
+    bool held = false;
+    if constexpr (HoldsHessian<M, Vectors>) held = preconditioner.holds_hessian();
+    if (!held) hessian_.update(e, x);
     auto const product = [&](Vectors const& d, Vectors const& hd) {
+      if constexpr (HoldsHessian<M, Vectors>) {
+        if (held) return preconditioner.hessian_product(d, hd);
+      }
       hessian_.product(e, x, d, hd);
     };
-    return cg_.solve(product, preconditioner, b, tolerance, params_.max_iterations, p);
+    return cg_.solve(product, preconditioner, b, tolerance, params_.max_iterations, p,
+                     params_.flexible);
   }
 
 private:

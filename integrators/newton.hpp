@@ -14,6 +14,12 @@
 
 namespace taut {
 
+/// What a rule for how exactly to solve knows of a gradient.
+struct GradientNorms {
+  double weighted;  ///< sqrt(g' M^-1 g)
+  double plain;     ///< sqrt(g'g)
+};
+
 /// How exactly a Newton direction is asked for: to a relative residual of
 ///   eta_k = gamma (|g_k| / |g_k-1|)^exponent,
 /// but not below gamma eta_k-1^exponent while that exceeds 0.1 (Eisenstat and Walker 1996, choice
@@ -32,8 +38,9 @@ public:
   template <class E>
   void start(E&) {}
   void restart() { norm_before_ = 0; }
-  /// From |M^-1 g|, mass-weighted, before the step.
-  LinearTolerance operator()(double norm) {
+  /// Before the step.
+  LinearTolerance operator()(GradientNorms const& norms) {
+    double const norm = norms.weighted;
     double eta = params_.largest;
     if (norm_before_ > 0 && !params_.fixed) {
       eta = params_.gamma * std::pow(norm / norm_before_, params_.exponent);
@@ -71,27 +78,56 @@ public:
                   params_.tolerance * std::sqrt(double(e.size())) * h * most};
   }
   void restart() {}
-  LinearTolerance operator()(double) const { return tolerance_; }
+  LinearTolerance operator()(GradientNorms const&) const { return tolerance_; }
 
 private:
   Params params_;
   LinearTolerance tolerance_ = 0.5;
 };
 
+/// The rule of Gast et al. 2015 (as Wang et al. 2020 compare with it): to a relative residual of
+///   min(largest, sqrt(max(|r|, tolerance))),
+/// where |r| is the plain norm of the residual of momentum, g / h, in kg m/s, and the tolerance
+/// that of MomentumNorm: a number of each scene's own.
+class MomentumForcing {
+public:
+  struct Params {
+    double largest = 0.5;
+    double tolerance = 1e-3;  ///< kg m/s
+  };
+  explicit MomentumForcing(Params const& params) : params_(params) {}
+
+  template <class E>
+  void start(E& e) {
+    per_step_ = 1 / e.scale().time_step;
+  }
+  void restart() {}
+  LinearTolerance operator()(GradientNorms const& norms) const {
+    return std::min(params_.largest,
+                    std::sqrt(std::max(per_step_ * norms.plain, params_.tolerance)));
+  }
+
+private:
+  Params params_;
+  double per_step_ = 1;
+};
+
 namespace kernels {
 
-/// g' M^-1 g and b = -g.
+/// g' M^-1 g, g'g and b = -g.
 template <class P, class S>
 struct NewtonRightHandSide {
+  enum { weighted, plain, count };
   VectorField<typename P::real, S> g, b;
   Array<typename P::real, S> mass;
-  KOKKOS_FUNCTION void operator()(int i, Sums<double, 1>& sums) const {
+  KOKKOS_FUNCTION void operator()(int i, Sums<double, count>& sums) const {
     double square = 0;
     for (int c = 0; c < 3; ++c) {
       b(i, c) = -g(i, c);
       square += double(g(i, c)) * double(g(i, c));
     }
-    if (square != 0) sums[0] += square / double(mass(i));
+    if (square != 0) sums[weighted] += square / double(mass(i));
+    sums[plain] += square;
   }
 };
 
@@ -187,10 +223,12 @@ public:
     Heading heading{.first_length = 1, .steepest = true, .solved = true};
     auto const& p = fields.direction;
     using RightHandSide = kernels::NewtonRightHandSide<P, S>;
-    heading.gradient = reducer_.template sum<1>("newton_rhs", e.size(),
-                                                RightHandSide{fields.gradient, b_, fields.mass})[0];
+    auto const squares = reducer_.template sum<RightHandSide::count>(
+        "newton_rhs", e.size(), RightHandSide{fields.gradient, b_, fields.mass});
+    heading.gradient = squares[RightHandSide::weighted];
 
-    LinearTolerance const tolerance = forcing_(std::sqrt(heading.gradient));
+    LinearTolerance const tolerance =
+        forcing_({std::sqrt(heading.gradient), std::sqrt(squares[RightHandSide::plain])});
     LinearReport const linear = linear_.solve(e, x, b_, preconditioner, tolerance, p);
     linear_iterations_ += linear.iterations;
     auto sums = products(fields);

@@ -105,6 +105,8 @@ public:
   }
 
   int material_count() const { return static_cast<int>(materials_.extent(0)); }
+  /// Those of the last update.
+  Particles<Precision, Space> const& particles() const { return particles_; }
 
   /// A new step begins: `blocks` are sorted by where `particles` are and bound to `grid`, whose
   /// nodes lie at `rest` (m).

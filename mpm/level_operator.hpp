@@ -12,11 +12,13 @@ namespace taut {
 template <class T, class S>
 struct LevelVectors {
   using Vectors = VectorField<T, S>;
-  Vectors b, x, r;  ///< right-hand side, solution, residual
-  Vectors d, y;     ///< step, and the operator times something
+  Vectors b, x, r;     ///< right-hand side, solution, residual
+  Vectors d, y;        ///< step, and the operator times something
+  Reducer<S> reducer;  ///< for one sum
 
   void resize(int n) {
     for (Vectors* v : {&b, &x, &r, &d, &y}) grow(*v, "level_vector", static_cast<std::size_t>(n));
+    reducer.provide(n, 1);
   }
 };
 

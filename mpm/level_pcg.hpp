@@ -42,38 +42,49 @@ struct PcgStep {
 
 }  // namespace kernels
 
-/// b' D^-1 b.
+/// b' D^-1 b. `reducer` is for as many unknowns.
 template <LevelOperator A, class T, class S>
 double jacobi_form(A const& a, VectorField<T, S> const& b, Reducer<S> const& reducer) {
   return reducer.template sum<1>("jacobi_form", a.size(),
                                  kernels::JacobiForm<S, T>{a.inverse(), b})[0];
 }
 
-/// Solves A x = b from nothing until r' D^-1 r is below `enough`, perhaps at once; returns the
-/// number of iterations. Uses the vectors r, d and y. `reducer` is for as many unknowns.
+/// How far conjugate gradients on a level go.
+struct LevelPcgLimits {
+  double enough = 0;       ///< until r' D^-1 r is below this
+  int max_iterations = 1;  ///< at most
+  bool conjugate = true;   ///< off: steepest descent in the metric of D
+};
+
+/// Goes on solving A x = b from an x with the residual r, perhaps not at all; returns the number of
+/// iterations, and leaves r. Uses the vectors d and y.
 template <LevelOperator A, class T, class S>
-int solve_by_pcg(A const& a, LevelVectors<T, S> const& v, Reducer<S> const& reducer, double enough,
-                 int max_iterations) {
+int continue_pcg(A const& a, LevelVectors<T, S> const& v, LevelPcgLimits const& limits) {
   int const n = a.size();
-  kernels::PcgStep<S, T> step{v.b, v.x, v.r, v.d, T(0), true};
-  for_each<S>("level_pcg_start", n, step);
-  step.start = false;
+  kernels::PcgStep<S, T> step{v.b, v.x, v.r, v.d, T(0), false};
   kernels::LanczosResidual<S, T> residual{a.inverse(), v.r, v.y, T(0)};
-  double rho = reducer.template sum<1>("level_pcg_residual", n, residual)[0], beta = 0;
+  double rho = v.reducer.template sum<1>("level_pcg_residual", n, residual)[0], beta = 0;
   int k = 0;
-  for (; k < max_iterations && rho >= enough && rho > 0; ++k) {
+  for (; k < limits.max_iterations && rho >= limits.enough && rho > 0; ++k) {
     for_each<S>("level_pcg_direction", n, kernels::LanczosDirection<S, T>{v.y, v.d, T(beta)});
     a.product(v.d, v.y);
     double const form =
-        reducer.template sum<1>("level_pcg_form", n, kernels::VectorDot<S, T>{v.d, v.y})[0];
+        v.reducer.template sum<1>("level_pcg_form", n, kernels::VectorDot<S, T>{v.d, v.y})[0];
     if (!(form > 0)) break;  // round-off is all that is left
     step.alpha = residual.alpha = T(rho / form);
     for_each<S>("level_pcg_step", n, step);
-    double const next = reducer.template sum<1>("level_pcg_residual", n, residual)[0];
-    beta = next / rho;
+    double const next = v.reducer.template sum<1>("level_pcg_residual", n, residual)[0];
+    beta = limits.conjugate ? next / rho : 0;
     rho = next;
   }
   return k;
+}
+
+/// The same from nothing.
+template <LevelOperator A, class T, class S>
+int solve_by_pcg(A const& a, LevelVectors<T, S> const& v, LevelPcgLimits const& limits) {
+  for_each<S>("level_pcg_start", a.size(), kernels::PcgStep<S, T>{v.b, v.x, v.r, v.d, T(0), true});
+  return continue_pcg(a, v, limits);
 }
 
 }  // namespace taut

@@ -7,7 +7,8 @@
 //
 // Every coarser level has the nodes that the finer one is interpolated from, and the matrix P'AP,
 // down to so few nodes that a dense inverse is cheap. What the fine level is (a matrix, or an
-// operator without one), how it hangs on the next, and how levels are smoothed are policies.
+// operator without one), how it hangs on the next, and how levels are smoothed are policies; and
+// where the matrices of the coarser levels come from, if not from P'AP.
 #pragma once
 
 #include <taut/core/sparse/dense_inverse.hpp>
@@ -43,7 +44,27 @@ struct SpreadRow {
   }
 };
 
+/// b = 0 at fixed nodes.
+template <class S, class T>
+struct ClearFixed {
+  FixedNodes<S> fixed;
+  VectorField<T, S> b;
+  KOKKOS_FUNCTION void operator()(int i) const {
+    if (fixed(i) == 0) return;
+    for (int c = 0; c < 3; ++c) b(i, c) = 0;
+  }
+};
+
 }  // namespace kernels
+
+/// Makes coarser levels by other means than P'AP of the finer one.
+template <class S, class T, int radius>
+struct LevelSource {
+  virtual ~LevelSource() = default;
+  /// `level` becomes number `l` below the fine one: resized to its nodes and to which are fixed,
+  /// and filled, but not finished. Called for 0, 1, ..., in this order.
+  virtual void make(int l, MatrixLevel<S, T, radius>& level) = 0;
+};
 
 /// What a hierarchy has become.
 struct MultigridReport {
@@ -74,6 +95,9 @@ public:
     /// the residual is this part of what the right-hand side of the cycle, restricted without
     /// smoothing, amounts to (HOT: 1/2), which may be at once.
     double coarse_tolerance = 0;
+    /// The part of the right-hand side of the coarsest level itself instead: then there is always
+    /// something to do.
+    bool coarse_by_own = false;
     int coarse_iterations = 10000;  ///< of these, at most
     typename FineSmoother::Params fine = {};
     typename Smoother::Params smoother = {};
@@ -82,17 +106,20 @@ public:
   Multigrid() : Multigrid(Params()) {}
   explicit Multigrid(Params const& params) : params_(params), fine_smoother_(params.fine) {}
 
-  /// Builds all levels below `fine`, which is finished and must outlive this. Allocates what
-  /// is larger than ever, and scratch for the coarsest level.
-  void build(Fine const& fine) {
+  using Source = LevelSource<Space, T, radius>;
+
+  /// Builds all levels below `fine`, which is finished and must outlive this, from `source` if
+  /// there is one. Allocates what is larger than ever, and scratch for the coarsest level.
+  void build(Fine const& fine, Source* source = nullptr) {
     fine_ = &fine;
+    source_ = source;
     report_ = {};
     coarse_count_ = 0;
     report_.nodes.push_back(fine.size());
     fine_vectors_.resize(fine.size());
     fine_smoother_.setup(fine, fine_vectors_);
     used_ = 0;
-    list_free_nodes();
+    if (source_ == nullptr) list_free_nodes();
     LeafList const* finer = &free_;
     double dx = fine.nodes().dx;
     while (add_level(*finer, dx)) {
@@ -101,7 +128,6 @@ public:
     }
     if (used_ > 0) invert_coarsest();
     if (solves_by_pcg()) {
-      coarse_reducer_.provide(levels_[used_ - 1].level.size(), 1);
       for (std::size_t l = 0; l < used_; ++l) {
         grow(levels_[l].unsmoothed, "level_vector",
              static_cast<std::size_t>(levels_[l].level.size()));
@@ -167,14 +193,18 @@ private:
     if (used_ > 0 && above <= params_.direct_nodes) return false;
     if (used_ == levels_.size()) levels_.emplace_back();
     Level& l = levels_[used_];
-    l.grid.coarsen(finer, Embedding::radius, dx);
-    int const count = l.grid.nodes().count;
+    if (source_ != nullptr) {
+      source_->make(static_cast<int>(used_), l.level);
+    } else {
+      l.grid.coarsen(finer, Embedding::radius, dx);
+    }
+    int const count = source_ != nullptr ? l.level.size() : l.grid.nodes().count;
     // Far-off crumbs of a few nodes stay as many on every level.
     if (count == 0 || (used_ > 0 && 10 * count > 9 * above)) return false;
-    l.level.resize(l.grid.nodes());
-    if (used_ == 0) {
+    if (source_ == nullptr) l.level.resize(l.grid.nodes());
+    if (source_ == nullptr && used_ == 0) {
       fine_->template coarse_matrix<Embedding>(l.level.matrix());
-    } else {
+    } else if (source_ == nullptr) {
       levels_[used_ - 1].level.template coarse_matrix<Embedding>(l.level.matrix());
     }
     l.level.finish();
@@ -209,29 +239,38 @@ private:
   bool solves_by_pcg() const {
     return used_ > 0 && !report_.direct && params_.coarse_tolerance > 0;
   }
-  /// What the residual of the coarsest level has to come down to.
-  double enough_on_coarsest() const {
-    restrict_to<Embedding>(fine_->nodes(), fine_->fixed(), fine_vectors_.b,
-                           levels_[0].level.nodes(), levels_[0].unsmoothed);
-    for (std::size_t l = 1; l < used_; ++l) {
-      restrict_to<Embedding>(levels_[l - 1].level.nodes(), FixedNodes<S>(),
-                             levels_[l - 1].unsmoothed, levels_[l].level.nodes(),
-                             levels_[l].unsmoothed);
-    }
-    double const asked = params_.coarse_tolerance * params_.coarse_tolerance;
+  /// What the residual of the coarsest level has to come down to, from a right-hand side of it.
+  double enough_of(VectorField<T, S> const& b) const {
     Level const& last = levels_[used_ - 1];
-    return asked * jacobi_form(last.level, last.unsmoothed, coarse_reducer_);
+    double const asked = params_.coarse_tolerance * params_.coarse_tolerance;
+    return asked * jacobi_form(last.level, b, last.vectors.reducer);
+  }
+  double enough_unsmoothed() const {
+    bring_down(*fine_, fine_vectors_.b, levels_[0].level, levels_[0].unsmoothed);
+    for (std::size_t l = 1; l < used_; ++l) {
+      bring_down(levels_[l - 1].level, levels_[l - 1].unsmoothed, levels_[l].level,
+                 levels_[l].unsmoothed);
+    }
+    return enough_of(levels_[used_ - 1].unsmoothed);
+  }
+
+  template <class Finer, class TF>
+  static void bring_down(Finer const& finer, VectorField<TF, S> const& from,
+                         MatrixLevel<S, T, radius> const& coarser, VectorField<T, S> const& to) {
+    restrict_to<Embedding>(finer.nodes(), finer.fixed(), from, coarser.nodes(), to);
+    if (coarser.fixed().extent(0) > 0) {
+      for_each<S>("clear_fixed", coarser.size(), kernels::ClearFixed<S, T>{coarser.fixed(), to});
+    }
   }
 
   /// From fine_vectors_.b to fine_vectors_.x.
   void cycle() const {
     auto const& v = fine_vectors_;
-    if (solves_by_pcg()) enough_ = enough_on_coarsest();
+    if (solves_by_pcg() && !params_.coarse_by_own) enough_ = enough_unsmoothed();
     fine_smoother_.first(*fine_, v);
     if (used_ > 0) {
       Level const& below = levels_[0];
-      restrict_to<Embedding>(fine_->nodes(), fine_->fixed(), v.r, below.level.nodes(),
-                             below.vectors.b);
+      bring_down(*fine_, v.r, below.level, below.vectors.b);
       visit(0);
       add_prolonged<Embedding>(below.level.nodes(), below.vectors.x, fine_->nodes(), fine_->fixed(),
                                v.x);
@@ -270,18 +309,17 @@ private:
       return;
     }
     if (l + 1 == used_ && solves_by_pcg()) {
-      coarse_count_ +=
-          solve_by_pcg(level.level, v, coarse_reducer_, enough_, params_.coarse_iterations);
+      if (params_.coarse_by_own) enough_ = enough_of(v.b);
+      coarse_count_ += solve_by_pcg(level.level, v, {enough_, params_.coarse_iterations});
       return;
     }
     level.smoother.first(level.level, v);
     if (l + 1 < used_) {
       Level const& below = levels_[l + 1];
-      restrict_to<Embedding>(level.level.nodes(), FixedNodes<S>(), v.r, below.level.nodes(),
-                             below.vectors.b);
+      bring_down(level.level, v.r, below.level, below.vectors.b);
       visit(l + 1);
       add_prolonged<Embedding>(below.level.nodes(), below.vectors.x, level.level.nodes(),
-                               FixedNodes<S>(), v.x);
+                               level.level.fixed(), v.x);
     }
     level.smoother.second(level.level, v);
   }
@@ -292,8 +330,8 @@ private:
   LevelVectors<FineScalar, S> fine_vectors_;
   std::deque<Level> levels_;  ///< below the fine one; the first `used_` of them
   std::size_t used_ = 0;
+  Source* source_ = nullptr;
   DenseInverse<S> inverse_;
-  Reducer<S> coarse_reducer_;
   mutable double enough_ = 0;  ///< of this cycle
   mutable int coarse_count_ = 0;
   MultigridReport report_;

@@ -10,6 +10,7 @@
 
 #include <taut/core/potential/preconditioning.hpp>
 #include <taut/mpm/cut_cells.hpp>
+#include <taut/mpm/geometric_levels.hpp>
 #include <taut/mpm/multigrid.hpp>
 #include <taut/mpm/particle_operator.hpp>
 
@@ -44,12 +45,23 @@ public:
   struct Params {
     Refresh refresh = Refresh::lagged(8);
     CutCells cut_cells = {};  ///< where there is no fine matrix
+    /// Coarser levels from the particles by their own kernels instead of P'AP
+    /// (geometric_levels.hpp): the baseline, where there is a fine matrix, linear embedding and one
+    /// scalar.
+    bool geometric = false;
     typename Cycle::Params cycle = {};
   };
   static constexpr char const* name = "particle_multigrid";
 
   ParticleMultigrid() : ParticleMultigrid(Params()) {}
-  explicit ParticleMultigrid(Params const& params) : params_(params), cycle_(params.cycle) {}
+  /// Throws Error where levels are to be geometric and cannot be.
+  explicit ParticleMultigrid(Params const& params) : params_(params), cycle_(params.cycle) {
+    if (params.geometric && !may_be_geometric) {
+      throw Error(
+          "particle_multigrid: levels are geometric only above a fine matrix, with the stencil and "
+          "the scalar of that");
+    }
+  }
 
   Refresh refresh() const { return params_.refresh; }
   void resize(int n) { local_ = local_memory_.resize("node_curvature", n); }
@@ -69,11 +81,22 @@ public:
       fine_.set(params_.cut_cells);
     }
     fine_.finish();
+    if constexpr (may_be_geometric && ShowsTerms<E>) {
+      if (params_.geometric) {
+        levels_.start(operator_, local_, e);
+        return cycle_.build(fine_, &levels_);
+      }
+    } else if (params_.geometric) {
+      throw Error("particle_multigrid: no term of this potential shows its particles");
+    }
     cycle_.build(fine_);
   }
 
   /// z = P g. Allocates nothing.
   void apply(Vectors const& g, Vectors const& z) const { cycle_.apply(g, z); }
+
+  bool holds_hessian() const { return params_.refresh.interval == 1; }
+  void hessian_product(Vectors const& d, Vectors const& hd) const { fine_.product(d, hd); }
 
   MultigridReport const& report() const { return cycle_.report(); }
   Cycle const& cycle() const { return cycle_; }
@@ -81,7 +104,13 @@ public:
   Operator const& hessian() const { return operator_; }
 
 private:
+  static constexpr bool may_be_geometric = assembled && Cycle::radius == Kernel::width - 1 &&
+                                           std::same_as<typename Policies::Scalar, Real>;
+  struct NoLevels {};
+  using Levels = std::conditional_t<may_be_geometric, GeometricLevels<Kernel, P, S>, NoLevels>;
+
   Params params_;
+  Levels levels_;
   LocalMatrices<P, S> no_curvature_;
   BlockField<Real, S> local_;
   Resizable<BlockField<Real, S>> local_memory_;

@@ -40,6 +40,8 @@ public:
   }
 
   GridNodes<S> const& nodes() const { return nodes_; }
+  BlockViews<K, S> const& blocks() const { return blocks_; }
+  int team_size() const { return team_size_; }
   FixedNodes<S> const& fixed() const { return fixed_; }
 
   /// y = A x

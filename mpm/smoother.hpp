@@ -50,9 +50,9 @@ struct ReduceNode {
   }
 };
 
-/// r_i = -sum_j A_ij x_j over the nodes after i.
+/// r_i = -sum_j A_ij x_j over some of the nodes.
 template <class S, class T>
-struct StoreUpper {
+struct StoreNegative {
   VectorField<T, S> x, r;
   KOKKOS_FORCEINLINE_FUNCTION Vec3<T> operator()(int i, Vec3<T> const&, Vec3<T> const& sum) const {
     set_vector(r, i, -sum);
@@ -117,12 +117,17 @@ struct SubtractProduct {
 
 /// Block Gauss-Seidel forward on the way down and backward on the way up: symmetric as a pair, at
 /// half the cost of symmetric sweeps. Nodes in the order of the colours of their blocks and in a
-/// block in that of their numbers, so the result does not depend on the number of threads.
+/// block in that of their numbers, so the result does not depend on the number of threads. Both
+/// directions are params; where they are the same the cycle is not symmetric, which is for
+/// stationary iterations, not for a metric.
 struct ForwardBackward {
   static constexpr char const* name = "forward_backward";
-  struct Params {};
+  struct Params {
+    bool down_backward = false;  ///< on the way down
+    bool up_backward = true;     ///< on the way up
+  };
   ForwardBackward() = default;
-  explicit ForwardBackward(Params const&) {}
+  explicit ForwardBackward(Params const& params) : params_(params) {}
 
   template <class A, class V>
   void setup(A const&, V&) {}
@@ -130,17 +135,24 @@ struct ForwardBackward {
   template <class S, class T, int radius>
   void first(MatrixLevel<S, T, radius> const& a, LevelVectors<T, S> const& v) const {
     using kernels::Part;
-    sweep_blocks("gauss_seidel_forward", a.matrix(), v.x,
-                 kernels::SolveNode<S, T>{a.inverse(), v.b, v.x}, Part::before, true, false);
-    // (D + L) x = b leaves the residual -U x.
-    sweep_blocks("gauss_seidel_upper", a.matrix(), v.x, kernels::StoreUpper<S, T>{v.x, v.r},
-                 Part::after, false, true);
+    bool const backward = params_.down_backward;
+    Part const known = backward ? Part::after : Part::before;
+    sweep_blocks("gauss_seidel_first", a.matrix(), v.x,
+                 kernels::SolveNode<S, T>{a.inverse(), v.b, v.x}, known, true, backward);
+    // (D + L) x = b leaves the residual -U x, and (D + U) x = b leaves -L x.
+    Part const missed = backward ? Part::before : Part::after;
+    sweep_blocks("gauss_seidel_missed", a.matrix(), v.x, kernels::StoreNegative<S, T>{v.x, v.r},
+                 missed, false, !backward);
   }
   template <class S, class T, int radius>
   void second(MatrixLevel<S, T, radius> const& a, LevelVectors<T, S> const& v) const {
-    sweep_blocks("gauss_seidel_backward", a.matrix(), v.x,
-                 kernels::RelaxNode<S, T>{a.inverse(), v.b, v.x}, kernels::Part::all, true, true);
+    sweep_blocks("gauss_seidel_second", a.matrix(), v.x,
+                 kernels::RelaxNode<S, T>{a.inverse(), v.b, v.x}, kernels::Part::all, true,
+                 params_.up_backward);
   }
+
+private:
+  Params params_;
 };
 
 /// Symmetric block Gauss-Seidel, (D + L) D^-1 (D + U), as HOT has it.
@@ -247,14 +259,18 @@ struct Chebyshev {
     double ratio = 30;    ///< of the largest eigenvalue to the least that is smoothed
     double safety = 1.1;  ///< on the largest, of which Lanczos sees too little
     int steps = 8;        ///< of Lanczos
+    /// Above 0: that many power steps at most instead, as HOT has it (512 there, and no safety).
+    int power_steps = 0;
   };
   Chebyshev() : Chebyshev(Params()) {}
   explicit Chebyshev(Params const& params) : params_(params) {}
 
-  /// The largest eigenvalue of D^-1 A, by Lanczos.
+  /// The largest eigenvalue of D^-1 A.
   template <LevelOperator A, class V>
   void setup(A const& a, V& v) {
-    largest_ = params_.safety * largest_eigenvalue(a, v, params_.steps);
+    double const found = params_.power_steps > 0 ? largest_by_power(a, v, params_.power_steps)
+                                                 : largest_eigenvalue(a, v, params_.steps);
+    largest_ = params_.safety * found;
   }
   double largest() const { return largest_; }
 

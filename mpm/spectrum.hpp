@@ -87,6 +87,16 @@ struct VectorDot {
   }
 };
 
+/// d = scale z
+template <class S, class T>
+struct PowerNext {
+  VectorField<T, S> z, d;
+  T scale;
+  KOKKOS_FUNCTION void operator()(int i) const {
+    for (int c = 0; c < 3; ++c) d(i, c) = scale * z(i, c);
+  }
+};
+
 }  // namespace kernels
 
 /// `A` has a preconditioner of its own in the place of D^-1: z = M r, kept until the next call.
@@ -137,6 +147,40 @@ double largest_eigenvalue(A const& a, LevelVectors<T, S> const& v, int steps = 8
   if (diagonal.empty()) return 1;
   beside.resize(diagonal.size() - 1);
   return largest_tridiagonal(diagonal, beside);
+}
+
+/// The same by power iteration, until a step changes the Rayleigh quotient d'A D^-1 A d / d'A d by
+/// less than `enough` of itself. Uses the vectors r, d and y.
+template <LevelOperator A, class T, class S>
+double largest_by_power(A const& a, LevelVectors<T, S> const& v, int max_steps,
+                        double enough = 1e-6) {
+  int const n = a.size();
+  if (n == 0) return 1;
+  for_each<S>("power_start", n, kernels::ScatterNumbers<S, T>{a.nodes(), v.d});
+  double largest = 1;
+  for (int k = 0; k < max_steps; ++k) {
+    a.product(v.d, v.r);
+    double const form =
+        v.reducer.template sum<1>("power_form", n, kernels::VectorDot<S, T>{v.d, v.r})[0];
+    // y = D^-1 r
+    double next = 0;
+    VectorField<T, S> z = v.y;
+    if constexpr (PreconditionedLevel<A>) {
+      z = a.preconditioned(v.r);
+      next = v.reducer.template sum<1>("power_next", n, kernels::VectorDot<S, T>{v.r, z})[0];
+    } else {
+      next = v.reducer.template sum<1>(
+          "power_next", n, kernels::LanczosResidual<S, T>{a.inverse(), v.r, v.y, T(0)})[0];
+    }
+    if (!(form > 0 && next > 0)) return largest;  // A is not positive, or zero along d
+    double const quotient = next / form;
+    bool const done = k > 0 && std::abs(quotient - largest) < enough * quotient;
+    largest = quotient;
+    if (done) break;
+    // The energy norm of z is near that of d times the quotient: keep it where it was.
+    for_each<S>("power_scale", n, kernels::PowerNext<S, T>{z, v.d, T(1 / quotient)});
+  }
+  return largest;
 }
 
 }  // namespace taut

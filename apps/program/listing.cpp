@@ -168,9 +168,16 @@ int plan_particles(Scene const& scene) {
       "halved where a particle would cross {:.3g}\n",
       scene.step, longest, points.cfl, points.crossing);
   fmt::print("minimiser\n");
-  for (MethodTitle const& title : method_titles())
-    if (title.name == solver.text("method"))
+  std::string const& method = solver.text("method");
+  // Where a name is in both lists, the one of particles says more.
+  auto titles = particle_method_titles();
+  auto const named = [&](MethodTitle const& title) { return title.name == method; };
+  if (std::none_of(titles.begin(), titles.end(), named)) titles = method_titles();
+  for (MethodTitle const& title : titles) {
+    if (named(title)) {
       fmt::print("  method        finds the direction: {}, {}\n", title.name, title.description);
+    }
+  }
   fmt::print("  metric        evens out stiffness and mass: {}\n", particle_preconditioner(solver));
   fmt::print("  curvature     is projected exactly, particle by particle\n");
   fmt::print("  line search   says how far to go: {}\n", solver.text("line_search"));

@@ -10,6 +10,8 @@
 #include <taut/integrators/lbfgs.hpp>
 #include <taut/integrators/ncg.hpp>
 
+#include <algorithm>
+
 namespace taut {
 
 template <class P>
@@ -42,7 +44,9 @@ public:
     }
     using Minimiser = Ncg<AnyBeta, AnyPreconditioner, AnyLineSearch, AnyStopping, P, Space>;
     typename Minimiser::Params params;
-    if (method.starts_with("hot") || method.starts_with("pn_") || method == "lbfgs_h") {
+    auto const titles = method_titles();
+    if (std::none_of(titles.begin(), titles.end(),
+                     [&](MethodTitle const& title) { return title.name == method; })) {
       throw Error(
           "solver.method = \"{}\" is of scenes of material points: choose lbfgs, newton, chebyshev "
           "or a nonlinear CG",

@@ -21,10 +21,11 @@ inline AnyStopping::Params stopping_of(SolverOptions const& options, int window)
   double const tolerance = options.number("tolerance");
   if (name == "energy_drop") return EnergyDrop::Params{.tolerance = tolerance};
   if (name == "gradient_norm") return GradientNorm::Params{tolerance, true};
-  if (name == "characteristic_norm") {
+  if (name == "characteristic_norm" || name == "momentum_norm") {
     throw Error(
-        "solver.stopping = \"characteristic_norm\" is of scenes of material points: choose "
-        "decrement_window, energy_drop or gradient_norm");
+        "solver.stopping = \"{}\" is of scenes of material points: choose decrement_window, "
+        "energy_drop or gradient_norm",
+        name);
   }
   int const asked = options.integer("window");
   return DecrementWindow::Params{.tolerance = name == "budget" ? 0 : tolerance,

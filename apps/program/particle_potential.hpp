@@ -46,8 +46,10 @@ public:
     });
   }
   int material_count() const { return materials_; }
+  Points const& particles() const { return particles_; }
   void update(Points const& particles, GridBlocks const& blocks,
-              GridNodes<DefaultSpace> const& grid, Positions const& rest) const {
+              GridNodes<DefaultSpace> const& grid, Positions const& rest) {
+    particles_ = particles;
     for (auto const& tell : told_) tell(particles, blocks, grid, rest);
   }
 
@@ -67,6 +69,7 @@ public:
 
 private:
   int materials_ = std::numeric_limits<int>::max();
+  Points particles_;
   std::vector<std::function<void(Points const&, GridBlocks const&, GridNodes<DefaultSpace> const&,
                                  Positions const&)>>
       told_;

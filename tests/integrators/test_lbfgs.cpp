@@ -55,6 +55,14 @@ Numbers two_loops(std::deque<Pair> const& pairs, Numbers const& g) {
   return plus(Numbers(q.size(), 0), -1, q);
 }
 
+/// P = 1, said to be another one now and then.
+template <class P = Mixed, class S = DefaultSpace>
+struct Renewed : Identity<P, S> {
+  static constexpr int every = 4;
+  using Identity<P, S>::Identity;
+  Refresh refresh() const { return Refresh::lagged(every); }
+};
+
 }  // namespace
 
 TEST_CASE("directions are those of the two-loop recursion, also after a rejected pair") {
@@ -99,6 +107,41 @@ TEST_CASE("directions are those of the two-loop recursion, also after a rejected
   // The last step's pair was never looked at.
   CHECK(report.skipped_pairs >= rejected - 1);
   CHECK(report.skipped_pairs <= rejected);
+}
+
+TEST_CASE("pairs are forgotten with the metric where that is asked for") {
+  bool const forget = GENERATE(false, true);
+  CAPTURE(forget);
+  toy::Chain<toy::Quartic> chain({.size = 12});
+  using Renewing = Lbfgs<Renewed, SufficientDecrease, DecrementWindow, Fp64>;
+  Renewing::Params params;
+  params.lbfgs = {.window = 8, .forget_when_renewed = forget, .least_curvature = 0.1};
+  params.stop.tolerance = 0;
+  params.budget.max_iterations = 40;
+  auto const x = chain.start();
+  toy::Chain<toy::Quartic>::Field const field("gradient", chain.size());
+  auto const gradient = [&](auto const& at) {
+    chain.gradient(at, field);
+    return numbers(field);
+  };
+  Numbers from = numbers(x), g = gradient(x);
+  std::deque<Pair> pairs;
+  double worst = 0;
+  auto const report = Renewing(params).minimise(chain, x, [&](auto const& step) {
+    if (forget && step.index % Renewed<>::every == 0) pairs.clear();
+    Numbers const p = two_loops(pairs, g), to = numbers(step.x), g_to = gradient(step.x);
+    Pair const pair{plus(to, -1, from), plus(g_to, -1, g)};
+    Numbers const off = plus(pair.s, -step.length, p);
+    worst = std::max(worst, std::sqrt(dot(off, off) / dot(pair.s, pair.s)));
+    if (pairs.size() == 8) pairs.pop_front();
+    if (dot(pair.s, pair.y) > 0.1 * std::abs(dot(pair.s, g))) pairs.push_back(pair);
+    from = to;
+    g = g_to;
+  });
+  REQUIRE(report.iterations == 40);
+  CHECK(report.restarts.total() == 0);
+  CHECK(report.refreshes == 10);
+  CHECK(worst < 1e-6);
 }
 
 TEST_CASE("L-BFGS finds the minimum, with all preconditioners") {

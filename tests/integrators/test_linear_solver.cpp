@@ -38,13 +38,14 @@ struct Solution {
 
 template <class S, class M = Identity<Fp64, S>>
 Solution solve(ProductWith<S> const& by_a, VectorField<double, S> const& b, double tolerance,
-               int max_iterations = 1000, M const& preconditioner = M()) {
+               int max_iterations = 1000, M const& preconditioner = M(), bool flexible = false) {
   ConjugateGradients<Fp64, S> cg;
   int const n = by_a.a.rows();
   cg.resize(n);
   VectorField<double, S> const x("x", n);
   assign(x, 42.0);  // its old value is of no account
-  LinearReport const report = cg.solve(by_a, preconditioner, b, tolerance, max_iterations, x);
+  LinearReport const report =
+      cg.solve(by_a, preconditioner, b, tolerance, max_iterations, x, flexible);
   return {report, numbers(x)};
 }
 
@@ -108,6 +109,33 @@ TEST_CASE("conjugate gradients end after as many steps as there are eigenvalues"
   CHECK(cg.report.iterations == 3);
 }
 
+TEST_CASE("flexible conjugate gradients bear a preconditioner that changes") {
+  /// Another diagonal each time.
+  struct Fickle {
+    mutable int calls = 0;
+    void apply(Field const& r, Field const& z) const {
+      ++calls;
+      for (int i = 0; i < r.extent_int(0); ++i)
+        for (int c = 0; c < 3; ++c) {
+          z(i, c) = (1 + (7 * i + 3 * c + 5 * calls) % 4) * r(i, c);
+        }
+    }
+  };
+  auto const a = lattice_matrix<DefaultSpace>(4, 0.1);
+  auto const b = random_field<double, DefaultSpace>(a.rows(), 3);
+  // A fixed one makes no difference.
+  Solution const fixed = solve<DefaultSpace>({a}, b, 1e-10);
+  Solution const flexible = solve<DefaultSpace>({a}, b, 1e-10, 1000, Id(), true);
+  CHECK(std::abs(flexible.report.iterations - fixed.report.iterations) <= 1);
+  CHECK(relative_difference(flexible.x, fixed.x) < 1e-8);
+
+  Solution const plain = solve<DefaultSpace>({a}, b, 1e-10, 1000, Fickle());
+  Solution const bears = solve<DefaultSpace>({a}, b, 1e-10, 1000, Fickle(), true);
+  CHECK(bears.report.stop == LinearStop::converged);
+  CHECK(relative_difference(bears.x, fixed.x) < 1e-7);
+  CHECK(bears.report.iterations < plain.report.iterations);
+}
+
 TEST_CASE("every iterate lowers the energy of the model") {
   auto const a = lattice_matrix<DefaultSpace>(4, 0.001);
   auto const b = random_field<double, DefaultSpace>(a.rows(), 3);
@@ -122,6 +150,32 @@ TEST_CASE("every iterate lowers the energy of the model") {
     CHECK(energy < last);
     last = energy;
   }
+}
+
+TEST_CASE("a preconditioner that holds the Hessian of the iterate lends it") {
+  struct Lender : Id {
+    bool lends = true;
+    mutable int products = 0;
+    bool holds_hessian() const { return lends; }
+    void hessian_product(Field const& d, Field const& hd) const {
+      ++products;
+      for (int i = 0; i < d.extent_int(0); ++i)
+        for (int c = 0; c < 3; ++c) hd(i, c) = 2 * d(i, c);
+    }
+  };
+  Chain chain;
+  auto const x = chain.start();
+  Field const g("g", chain.size()), p("p", chain.size());
+  chain.gradient(x, g);
+  AssembledPcg<Fp64> pcg;
+  pcg.start(chain);
+  Lender lender;
+  CHECK(pcg.solve(chain, x, g, lender, 1e-12, p).stop == LinearStop::converged);
+  CHECK(lender.products == 1);  // twice the identity
+  for (int i = 0; i < chain.size(); ++i) CHECK(std::abs(p(i, 0) - g(i, 0) / 2) < 1e-12);
+  lender.lends = false;
+  pcg.solve(chain, x, g, lender, 1e-12, p);
+  CHECK(lender.products == 1);
 }
 
 TEST_CASE("conjugate gradients truncate where no curvature is left") {

@@ -64,11 +64,12 @@ struct GoldenStep {
   ParticleGrid<QuadraticSpline, P, S> grid;
   Scene scene;
 
-  explicit GoldenStep(std::string const& which)
+  /// `coarser`: on a grid whose spacing is that many times as large.
+  explicit GoldenStep(std::string const& which, int coarser = 1)
       : golden(nlohmann::json::parse(std::ifstream(data_file("vectors/hot_vectors.json")))
                    .at("one_step_goldens")
                    .at(which)),
-        dx(golden.at("dx")),
+        dx(coarser * double(golden.at("dx"))),
         h(golden.at("dt")),
         gravity{golden.at("gravity")[0], golden.at("gravity")[1], golden.at("gravity")[2]},
         particles(golden_block(which)),

@@ -202,7 +202,17 @@ TEST_CASE("all methods find the same step", "[particles]") {
        {"solver.method=lbfgs_h"},
        {"solver.method=pn_pcg"},
        {"solver.method=pn_pcg_mf"},
-       {"solver.method=pn_mgpcg"}}));
+       {"solver.method=hot", "solver.refresh=lagged", "solver.refresh_every=4",
+        "solver.forget=true", "solver.smoother=chebyshev_power", "solver.cycle=w"},
+       {"solver.method=hot", "solver.smoother=forward_backward", "solver.coarse_solver=direct"},
+       {"solver.method=hot", "solver.smoother=pcg", "solver.coarse_solver=pcg_own"},
+       {"solver.method=lbfgs_gmg"},
+       {"solver.method=lbfgs_plain"},
+       {"solver.method=pn_sgspcg"},
+       {"solver.method=pn_mgpcg"},
+       {"solver.method=pn_mgpcg", "solver.smoother=optimal_jacobi", "solver.flexible=true"},
+       {"solver.method=pn_gmgpcg", "solver.coarse_solver=smoother"},
+       {"solver.method=gast15"}}));
   CAPTURE(other);
   auto const x = step(other);
   double worst = 0;
