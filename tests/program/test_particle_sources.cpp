@@ -245,7 +245,8 @@ TEST_CASE("the grid and the surface are written on request", "[particles][output
 }
 
 TEST_CASE("snow falls on boards", "[particles][source][scenes]") {
-  SceneRun run("boards.toml", read_file(scene_folder() / "boards.toml"), {"time.frames=2"});
+  SceneRun run("boards.toml", read_file(scene_folder() / "boards.toml"),
+               {"time.frames=2", "time.step=0.02"});
   run.options.scene.changes.small = true;
   REQUIRE(run_command(run.options) == 0);
   CHECK(run.summary().at("steps_converged") == 2);
