@@ -147,9 +147,11 @@ class Points:
         if self.mesh.n_points == len(self.vertex):
             self.mesh.points = points[self.vertex]
             return
-        fresh = pv.PolyData(points[self.vertex])
-        fresh["colour"] = np.zeros((len(self.vertex), 3), dtype=np.uint8)
-        fresh.set_active_scalars("colour")
+        fresh = pv.PolyData()
+        if len(self.vertex):
+            fresh = pv.PolyData(points[self.vertex])
+            fresh["colour"] = np.zeros((len(self.vertex), 3), dtype=np.uint8)
+            fresh.set_active_scalars("colour")
         self.mesh.ShallowCopy(fresh)
 
     def refine(self, length):
@@ -160,7 +162,8 @@ class Points:
 
     def paint(self, light, base, least):
         """Balls have a light and a dark side of their own; what is deep between others is not seen."""
-        self.fine["colour"][:] = base[:self.mesh.n_points].round()
+        if self.mesh.n_points:
+            self.fine["colour"][:] = base[:self.mesh.n_points].round()
         self.fine.Modified()
 
 
