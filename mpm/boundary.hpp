@@ -1,7 +1,8 @@
-// What holds the nodes of a grid: half-spaces, boxes, balls, cylinders and tori, solid inside or
-// outside, which move rigidly. A node belongs to a boundary if it is in the solid at the end of the
-// step; what is asked of it there is asked of its velocity, for nodes of a grid stay where they
-// are: none relative to the solid (sticky), none along the normal (slip), none into it (separate).
+// What holds the nodes of a grid: half-spaces, boxes, balls, cylinders, tori and what has a field
+// of distances (distance_field.hpp), solid inside or outside, which move rigidly. A node belongs to
+// a boundary if it is in the solid at the end of the step; what is asked of it there is asked of
+// its velocity, for nodes of a grid stay where they are: none relative to the solid (sticky), none
+// along the normal (slip), none into it (separate).
 #pragma once
 
 #include <taut/core/exec/copy.hpp>
@@ -9,17 +10,60 @@
 #include <taut/core/exec/space.hpp>
 #include <taut/core/math/rigid_pose.hpp>
 #include <taut/core/report/error.hpp>
+#include <taut/mpm/distance_field.hpp>
 
 #include <cstdint>
 #include <functional>
+#include <memory>
 #include <string>
 #include <utility>
 #include <vector>
 
 namespace taut {
 
-enum class BoundaryShape : std::uint8_t { half_space, box, ball, cylinder, torus };
+enum class BoundaryShape : std::uint8_t { half_space, box, ball, cylinder, torus, field };
 enum class BoundaryContact : std::uint8_t { sticky, slip, separate };
+
+/// A DistanceField as kernels see it.
+struct FieldView {
+  float const* values = nullptr;
+  int n[3] = {0, 0, 0};
+  double spacing = 1, band = 0;
+  Vec3<double> lowest{};
+
+  /// The trilinear interpolant, and its direction of ascent; the band's width around the lattice.
+  KOKKOS_FUNCTION double distance(Vec3<double> const& y, Vec3<double>& normal) const {
+    int at[3];
+    double t[3];
+    normal = {0, 1, 0};
+    for (int c = 0; c < 3; ++c) {
+      double const u = (y[c] - lowest[c]) / spacing;
+      if (!(u >= 0 && u < n[c] - 1)) return band;
+      at[c] = static_cast<int>(u);
+      t[c] = u - at[c];
+    }
+    double d = 0;
+    Vec3<double> ascent{};
+    for (int corner = 0; corner < 8; ++corner) {
+      int const on[3] = {corner >> 2, corner >> 1 & 1, corner & 1};
+      double weight[3], slope[3];
+      for (int c = 0; c < 3; ++c) {
+        weight[c] = on[c] ? t[c] : 1 - t[c];
+        slope[c] = on[c] ? 1 : -1;
+      }
+      std::size_t const i = std::size_t(at[0] + on[0]), j = std::size_t(at[1] + on[1]),
+                        k = std::size_t(at[2] + on[2]);
+      double const value = double(values[(i * n[1] + j) * n[2] + k]);
+      d += weight[0] * weight[1] * weight[2] * value;
+      ascent[0] += slope[0] * weight[1] * weight[2] * value;
+      ascent[1] += weight[0] * slope[1] * weight[2] * value;
+      ascent[2] += weight[0] * weight[1] * slope[2] * value;
+    }
+    double const length = norm(ascent);
+    if (length > 0) normal = (1 / length) * ascent;
+    return d;
+  }
+};
 
 /// A boundary at one moment, as kernels see it.
 struct Boundary {
@@ -31,6 +75,7 @@ struct Boundary {
   RigidPose pose;           ///< the shape's own frame to the world
   Vec3<double> velocity{};  ///< of the pose's origin, m/s
   Vec3<double> spin{};      ///< about that origin, rad/s
+  FieldView field = {};
 
   /// Distance to the surface, m, negative in the solid; and the normal that leads out of it.
   KOKKOS_FUNCTION double distance(Vec3<double> const& x, Vec3<double>& normal) const {
@@ -48,6 +93,8 @@ struct Boundary {
       double const r = norm(to_ring);
       to_ring = r > 0 ? (size[0] / r) * to_ring : Vec3<double>{size[0], 0, 0};
       d = away(y - to_ring, n) - size[1];
+    } else if (shape == BoundaryShape::field) {
+      d = field.distance(y, n);
     }
     double const sign = outside ? -1 : 1;
     normal = pose.rotation * (sign * n);
@@ -107,6 +154,7 @@ struct BoundaryMotion {
 ///   half_space   solid below y = 0                    box        lengths along x, y, z
 ///   ball         radius                               cylinder   radius, height (axis y)
 ///   torus        radius of the ring (axis y), of its section
+///   field        none: the field has them
 struct BoundarySpec {
   std::string name = {};
   BoundaryShape shape = BoundaryShape::half_space;
@@ -116,6 +164,7 @@ struct BoundarySpec {
   Vec3<double> size{};
   /// As a function of time, s; empty: at rest at the origin.
   std::function<BoundaryMotion(double)> motion = {};
+  std::shared_ptr<DistanceField const> field = {};
 };
 
 /// A motion that never changes.
@@ -129,7 +178,7 @@ public:
   BoundaryList() = default;
   /// Throws Error for a size or a friction that cannot be.
   explicit BoundaryList(std::vector<BoundarySpec> specs) : specs_(std::move(specs)) {
-    constexpr int numbers[] = {0, 3, 1, 2, 2};
+    constexpr int numbers[] = {0, 3, 1, 2, 2, 0};
     for (BoundarySpec const& spec : specs_) {
       for (int k = 0; k < numbers[static_cast<int>(spec.shape)]; ++k) {
         if (!(spec.size[k] > 0) || !std::isfinite(spec.size[k])) {
@@ -139,6 +188,10 @@ public:
       if (!(spec.friction >= 0) || !std::isfinite(spec.friction)) {
         throw Error("boundary \"{}\": friction = {}; give 0 or more", spec.name, spec.friction);
       }
+      if ((spec.shape == BoundaryShape::field) != bool(spec.field)) {
+        throw Error("boundary \"{}\": a field of distances and its shape go together", spec.name);
+      }
+      fields_.push_back(spec.field ? upload(*spec.field) : Values());
     }
     list_ = View("boundaries", specs_.size());
     host_ = Kokkos::create_mirror_view(list_);
@@ -157,6 +210,7 @@ public:
       }
       host_(k) = {spec.shape, spec.contact, spec.outside, spec.friction,
                   spec.size,  at.pose,      at.velocity,  at.spin};
+      if (spec.field) host_(k).field = view_of(*spec.field, fields_[k]);
     }
     assign_on<S>(list_, host_);
     S::instance().fence("taut: boundaries");
@@ -175,7 +229,25 @@ public:
 
 private:
   using View = Kokkos::View<Boundary*, typename S::memory>;
+  using Values = Kokkos::View<float*, typename S::memory>;
+
+  static Values upload(DistanceField const& field) {
+    Values values("boundary_field", field.values.size());
+    Kokkos::View<float const*, Kokkos::HostSpace> const host(field.values.data(),
+                                                             field.values.size());
+    Kokkos::deep_copy(values, host);
+    return values;
+  }
+  static FieldView view_of(DistanceField const& field, Values const& values) {
+    return {values.data(),
+            {field.n[0], field.n[1], field.n[2]},
+            field.spacing,
+            field.band,
+            field.lowest};
+  }
+
   std::vector<BoundarySpec> specs_;
+  std::vector<Values> fields_;  ///< per boundary, empty without one
   View list_;
   typename View::HostMirror host_;
 };

@@ -4,6 +4,7 @@
 #include <openvdb/io/File.h>
 #include <openvdb/openvdb.h>
 #include <openvdb/tools/Interpolation.h>
+#include <openvdb/tools/VolumeToMesh.h>
 
 #include <algorithm>
 #include <cmath>
@@ -35,6 +36,29 @@ openvdb::FloatGrid::Ptr read_level_set(std::filesystem::path const& path) {
 }
 
 }  // namespace
+
+TriangleMesh surface_of_level_set(std::filesystem::path const& file) {
+  if (!std::filesystem::exists(file)) throw Error("{}: there is no such file", file.string());
+  std::vector<openvdb::Vec3s> points;
+  std::vector<openvdb::Vec3I> triangles;
+  std::vector<openvdb::Vec4I> quads;
+  openvdb::tools::volumeToMesh(*read_level_set(file), points, triangles, quads);
+  TriangleMesh surface;
+  for (openvdb::Vec3s const& p : points) surface.points.push_back({p[0], p[1], p[2]});
+  // OpenVDB lists corners clockwise as seen from outside.
+  auto const add = [&](auto const& cell, int a, int b, int c) {
+    surface.triangles.push_back({static_cast<std::int32_t>(cell[a]),
+                                 static_cast<std::int32_t>(cell[b]),
+                                 static_cast<std::int32_t>(cell[c])});
+  };
+  for (openvdb::Vec3I const& t : triangles) add(t, 0, 2, 1);
+  for (openvdb::Vec4I const& q : quads) {
+    add(q, 0, 2, 1);
+    add(q, 0, 3, 2);
+  }
+  if (surface.triangles.empty()) throw Error("{}: the level set has no surface", file.string());
+  return surface;
+}
 
 Solid solid_in_level_set(std::filesystem::path const& file) {
   if (!std::filesystem::exists(file)) throw Error("{}: there is no such file", file.string());

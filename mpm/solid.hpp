@@ -39,6 +39,9 @@ Solid solid_in_surface(TriangleMesh const& surface, std::string const& name, dou
 /// floats that is a level set is taken. Throws Error if there is none, or if it has no inside.
 Solid solid_in_level_set(std::filesystem::path const& file);
 
+/// The surface of that level set, its normals outward, m. Throws Error as above.
+TriangleMesh surface_of_level_set(std::filesystem::path const& file);
+
 /// The same body elsewhere.
 Solid placed(Solid const& solid, RigidPose const& pose);
 /// What is in `solid` and not in `hole`; its volume is measured by a fine grid of points.

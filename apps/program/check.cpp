@@ -47,7 +47,7 @@ int check_particles(ResultReader const& reader) {
     if (reader.has_velocities()) lost += not_finite(reader.velocities(frame));
     auto const J = reader.scalar("J", frame);
     std::size_t inverted = 0, first = 0;
-    for (std::size_t p = all.particles; p-- > 0;) {
+    for (std::size_t p = reader.particles(frame); p-- > 0;) {
       if (J[p] > 0) continue;  // what is not a number counts as inverted
       ++inverted;
       first = p;

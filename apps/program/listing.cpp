@@ -136,8 +136,18 @@ int plan_particles(Scene const& scene) {
   SolverOptions const& solver = scene.solver;
   fmt::print("{}: {}\n", scene.name, scene.description);
   fmt::print("  {} particles of {} object{}, a grid of {:.4g} m; {} boundar{}\n",
-             particles.list.size(), points.bodies.size(), points.bodies.size() == 1 ? "" : "s",
+             particles.initial(), points.bodies.size(), points.bodies.size() == 1 ? "" : "s",
              points.spacing, points.boundaries.size(), points.boundaries.size() == 1 ? "y" : "ies");
+  double cells = 0;
+  for (Particle const& p : particles.list) {
+    cells += p.volume / (points.spacing * points.spacing * points.spacing);
+  }
+  auto const count = static_cast<double>(particles.list.size());
+  if (!points.sources.empty())
+    fmt::print("  {} particles more come out of {} source{}\n", count - double(particles.initial()),
+               points.sources.size(), points.sources.size() == 1 ? "" : "s");
+  fmt::print("  memory: about {:.2g} GB\n",
+             1e-9 * particle_memory_needed(count, count / cells, solver));
   fmt::print("terms of the potential\n");
   fmt::print(
       "  inertia       carries the motion on: {} between particles and grid, implicit Euler\n",

@@ -219,6 +219,30 @@ void require_memory(MeshSize const& size, SolverOptions const& solver) {
   }
 }
 
+double particle_memory_needed(double particles, double per_cell, SolverOptions const& solver) {
+  std::string const& method = solver.text("method");
+  bool const assembles = method == "hot" || method == "hot_quadratic" || method == "pn_pcg" ||
+                         method == "pn_mgpcg" ||
+                         (method == "newton" && solver.text("hessian") != "matrix_free");
+  // Particles on the host for reading and writing and on the device, with what the operator keeps
+  // of each (45 numbers); nodes with their fields and history and coarser levels (125 blocks in a
+  // row of an eighth of them); a matrix of their own where there is one. There are about twice as
+  // many nodes as cells in thick bodies, more in thin ones. (Measured: 2e4 to 4e5 particles.)
+  double const nodes = 3 * particles / per_cell;
+  return 4e7 + particles * 1900 + nodes * (assembles ? 16000 : 5000);
+}
+
+void require_particle_memory(double particles, double per_cell, SolverOptions const& solver) {
+  double const needed = particle_memory_needed(particles, per_cell, solver),
+               available = memory_available();
+  if (needed > available) {
+    throw Error(
+        "the scene has about {:.3g} particles and needs about {:.3g} GB of memory, of which {:.3g} "
+        "GB are free: raise grid.spacing, or lower its per_cell",
+        particles, 1e-9 * needed, 1e-9 * available);
+  }
+}
+
 SceneGeometry build_within_memory(Scene const& scene) {
   if (scene.particles) return build_geometry(scene);  // says that there are no meshes
   MeshSize const expected = estimate_size(scene);

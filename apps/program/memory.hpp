@@ -24,6 +24,12 @@ double memory_available(std::filesystem::path const& root = "/");
 /// Throws Error if a mesh of this size needs more than there is.
 void require_memory(MeshSize const& size, SolverOptions const& solver);
 
+/// Bytes that so many material points take with their grid and solver, an upper estimate.
+/// `per_cell`: how many of them there are in a cell.
+double particle_memory_needed(double particles, double per_cell, SolverOptions const& solver);
+/// Throws Error if a scene of so many material points needs more than there is.
+void require_particle_memory(double particles, double per_cell, SolverOptions const& solver);
+
 /// build_geometry() once it is known to fit; says so on stderr if it will take long.
 SceneGeometry build_within_memory(Scene const& scene);
 

@@ -1,9 +1,11 @@
+#include <taut/apps/program/memory.hpp>
+#include <taut/apps/program/particle_frames.hpp>
 #include <taut/apps/program/particle_geometry.hpp>
-#include <taut/apps/program/scene_obstacle.hpp>
 #include <taut/core/io/mesh_reader.hpp>
 #include <taut/core/report/error.hpp>
 #include <taut/materials/invariants.hpp>
 #include <taut/mpm/sampling.hpp>
+#include <taut/mpm/topology.hpp>
 
 #include <algorithm>
 #include <cmath>
@@ -12,31 +14,6 @@
 
 namespace taut {
 namespace {
-
-Vec3<double> to_vec(Point const& p) { return {p[0], p[1], p[2]}; }
-
-RigidPose to_pose(RigidMap const& map) {
-  RigidPose pose;
-  for (int r = 0; r < 3; ++r)
-    for (int c = 0; c < 3; ++c) pose.rotation(r, c) = map.rotation[r][c];
-  pose.translation = to_vec(map.translation);
-  return pose;
-}
-
-/// Turns the y axis into a unit vector.
-RigidMap turn_up(Point const& to) {
-  Point const axis = cross({0, 1, 0}, to);
-  double const sine = norm(axis);
-  if (sine > 0) return rotation_about((1 / sine) * axis, std::atan2(sine, to[1]), {});
-  return to[1] > 0 ? RigidMap{} : rotation_about({1, 0, 0}, std::numbers::pi, {});
-}
-
-/// Of a solid whose axis is y, to the axis of the shape.
-RigidMap frame_of(CylinderShape const& c) {
-  Point axis{};
-  axis[static_cast<std::size_t>(c.axis)] = 1;
-  return turn_up(axis);
-}
 
 struct MakeSolid {
   Solid operator()(BoxShape const& box) const { return solid_box(to_vec(box.size)); }
@@ -78,9 +55,8 @@ bool same(Plasticity const& a, Plasticity const& b) {
          a.most == b.most && a.angle == b.angle;
 }
 
-MaterialFlow flow_of(SceneBody const& body) {
-  Plasticity const& p = body.plasticity;
-  Lame<double> const lame = lame_parameters(body.material.young, body.material.poisson);
+MaterialFlow flow_of(MaterialParameters const& material, Plasticity const& p) {
+  Lame<double> const lame = lame_parameters(material.young, material.poisson);
   MaterialFlow flow;
   for (std::size_t k = 0; k < plasticity_kinds().size(); ++k) {
     if (plasticity_kinds()[k] == p.kind) flow.kind = static_cast<FlowKind>(k);
@@ -92,20 +68,24 @@ MaterialFlow flow_of(SceneBody const& body) {
   return flow;
 }
 
-/// Numbers the materials; those that are alike have one number.
+/// Numbers the materials of bodies, then of sources; those that are alike have one number.
 std::vector<int> number_materials(ParticleScene const& scene, SceneParticles& to) {
   std::vector<int> number;
-  std::vector<SceneBody const*> first;
-  for (SceneBody const& body : scene.bodies) {
-    auto const known = std::find_if(first.begin(), first.end(), [&](SceneBody const* other) {
-      return same(other->material, body.material) && same(other->plasticity, body.plasticity);
-    });
-    number.push_back(static_cast<int>(known - first.begin()));
-    if (known != first.end()) continue;
-    first.push_back(&body);
-    to.materials.push_back(body.material);
-    to.flows.push_back(flow_of(body));
-  }
+  std::vector<Plasticity> flows;
+  auto const add = [&](MaterialParameters const& material, Plasticity const& plasticity) {
+    std::size_t known = 0;
+    while (known < flows.size() &&
+           !(same(to.materials[known], material) && same(flows[known], plasticity))) {
+      ++known;
+    }
+    number.push_back(static_cast<int>(known));
+    if (known < flows.size()) return;
+    flows.push_back(plasticity);
+    to.materials.push_back(material);
+    to.flows.push_back(flow_of(material, plasticity));
+  };
+  for (SceneBody const& body : scene.bodies) add(body.material, body.plasticity);
+  for (SceneSource const& source : scene.sources) add(source.material, source.plasticity);
   return number;
 }
 
@@ -146,7 +126,7 @@ void start_moving(SceneBody const& body, Particle& p) {
 
 /// A body that begins in a wall is pushed out of it with whatever force that takes.
 void refuse_inside(ParticleScene const& scene, SceneParticles const& particles) {
-  BoundaryList<Space<Kokkos::DefaultHostExecutionSpace>> walls(boundary_specs(scene));
+  BoundaryList<Space<Kokkos::DefaultHostExecutionSpace>> walls(particles.boundaries);
   auto const list = walls.list();
   for (std::size_t k = 0; k < scene.boundaries.size(); ++k) {
     if (scene.boundaries[k].law == BoundaryLaw::stick) continue;
@@ -157,6 +137,44 @@ void refuse_inside(ParticleScene const& scene, SceneParticles const& particles) 
           "move one of them (object.NAME.translate, boundary.NAME.translate)",
           scene.boundaries[k].where, scene.bodies[static_cast<std::size_t>(p.object)].name,
           scene.boundaries[k].name, p.x[0], p.x[1], p.x[2]);
+    }
+  }
+}
+
+/// Before anything is sampled.
+void require_memory_for(Scene const& scene, std::vector<Solid> const& solids) {
+  ParticleScene const& points = *scene.particles;
+  double const cell = points.spacing * points.spacing * points.spacing;
+  double particles = 0, cells = 0;
+  auto const add = [&](double volume, double per_cell) {
+    particles += volume / cell * per_cell;
+    cells += volume / cell;
+  };
+  for (std::size_t b = 0; b < solids.size(); ++b) {
+    add(solids[b].volume, points.bodies[b].per_cell);
+  }
+  for (SceneSource const& source : points.sources) {
+    add(volume_let_out(source, scene.step * scene.frames), source.per_cell);
+  }
+  if (cells == 0) return;
+  try {
+    require_particle_memory(particles, particles / cells, scene.solver);
+  } catch (Error const& error) {
+    throw Error("{}: {}", scene.file.string(), error.what());
+  }
+}
+
+/// Nodes have numbers, and those end.
+void refuse_far(ParticleScene const& scene, std::vector<Solid> const& solids) {
+  double const end = 0.5 * Topology::farthest * scene.spacing;
+  for (std::size_t b = 0; b < solids.size(); ++b) {
+    for (int c = 0; c < 3; ++c) {
+      double const far = std::max(-solids[b].lowest[c], solids[b].highest[c]);
+      if (far < end) continue;
+      throw Error(
+          "{}: object {} reaches {:.3g} m from the origin, and a grid of cells of {} m ends at "
+          "{:.3g} m: move it nearer, or raise grid.spacing",
+          scene.bodies[b].where, scene.bodies[b].name, far, scene.spacing, end);
     }
   }
 }
@@ -176,112 +194,17 @@ void refuse_coarse(ParticleScene const& scene, std::vector<Solid> const& solids)
   }
 }
 
-std::vector<TriangleMesh> draw(ParticleScene const& scene, std::vector<Particle> const& list) {
-  std::array<Point, 2> around{Point{list[0].x[0], list[0].x[1], list[0].x[2]}, Point{}};
-  around[1] = around[0];
-  for (Particle const& p : list)
-    for (std::size_t c = 0; c < 3; ++c) {
-      around[0][c] = std::min(around[0][c], p.x[static_cast<int>(c)]);
-      around[1][c] = std::max(around[1][c], p.x[static_cast<int>(c)]);
-    }
-  constexpr int resolution = 16;
-  std::vector<TriangleMesh> drawings;
-  for (SceneBoundary const& boundary : scene.boundaries) {
-    SceneObstacle obstacle;
-    obstacle.where = boundary.where;
-    obstacle.placement = boundary.placement;
-    if (auto const* half = std::get_if<HalfSpaceShape>(&boundary.shape)) {
-      obstacle.geometry = *half;
-    } else {
-      obstacle.geometry = ProceduralShape{std::get<Shape>(boundary.shape), resolution};
-    }
-    drawings.push_back(triangles_of(obstacle, around, resolution));
-    if (!boundary.inside) continue;
-    for (Triangle& t : drawings.back().triangles) std::swap(t[1], t[2]);
+std::vector<Particle> sampled(Scene const& scene, std::vector<ParticleBody> const& bodies) {
+  ParticleScene const& points = *scene.particles;
+  try {
+    return sample(bodies, points.spacing,
+                  {static_cast<std::uint64_t>(points.seed), points.check_overlap});
+  } catch (Error const& error) {
+    throw Error("{}: {}", scene.file.string(), error.what());
   }
-  return drawings;
 }
-
-/// Where no particle is, m.
-constexpr double taken_away = -1e12;
-
-/// Velocity and spin of what follows a motion, at the end of a step at time t; `x` is where a point
-/// of it is then.
-BoundaryMotion motion_at(SceneBoundary const& boundary, RigidMap const& frame, double t) {
-  BoundaryMotion at;
-  RigidMap const pose = compose(boundary.motion.at(t), compose(boundary.placement, frame));
-  at.pose = to_pose(pose);
-  double const slack = 1e-9 * (1 + std::abs(t));
-  if (boundary.release && t > *boundary.release + slack) {
-    at.pose.translation[1] = taken_away;
-    return at;
-  }
-  for (MotionPhase const& phase : boundary.motion.phases) {
-    // A phase is over after the step that ends with it.
-    if (!(t > phase.window.start + slack && t <= phase.window.end + slack)) continue;
-    double const tau = t - phase.window.start;
-    Point const spin = (phase.angular_velocity + phase.angular_acceleration * tau) * phase.axis;
-    Point const arm = pose.translation - (phase.centre + tau * phase.velocity);
-    at.spin = to_vec(spin);
-    at.velocity = to_vec(phase.velocity + cross(spin, arm));
-  }
-  return at;
-}
-
-struct SpecOf {
-  BoundarySpec& spec;
-
-  RigidMap operator()(HalfSpaceShape const& half) const {
-    spec.shape = BoundaryShape::half_space;
-    RigidMap frame = turn_up(half.normal);
-    frame.translation = half.point;
-    return frame;
-  }
-  RigidMap operator()(Shape const& shape) const { return std::visit(*this, shape); }
-  RigidMap operator()(BoxShape const& box) const {
-    spec.shape = BoundaryShape::box;
-    spec.size = to_vec(box.size);
-    return {};
-  }
-  RigidMap operator()(SphereShape const& ball) const {
-    spec.shape = BoundaryShape::ball;
-    spec.size = {ball.radius, 0, 0};
-    return {};
-  }
-  RigidMap operator()(CylinderShape const& c) const {
-    spec.shape = BoundaryShape::cylinder;
-    spec.size = {c.radius, c.length, 0};
-    return frame_of(c);
-  }
-  RigidMap operator()(TorusShape const& t) const {
-    spec.shape = BoundaryShape::torus;
-    spec.size = {t.radius, t.tube_radius, 0};
-    return {};
-  }
-  template <class Other>
-  RigidMap operator()(Other const&) const {
-    throw Error("this shape is of meshes alone");  // the reader lets none through
-  }
-};
 
 }  // namespace
-
-std::vector<BoundarySpec> boundary_specs(ParticleScene const& scene) {
-  constexpr BoundaryContact laws[] = {BoundaryContact::sticky, BoundaryContact::slip,
-                                      BoundaryContact::separate};
-  std::vector<BoundarySpec> specs;
-  for (SceneBoundary const& boundary : scene.boundaries) {
-    BoundarySpec spec;
-    spec.name = boundary.name;
-    spec.contact = laws[static_cast<int>(boundary.law)];
-    spec.outside = boundary.inside;
-    spec.friction = boundary.friction;
-    RigidMap const frame = std::visit(SpecOf{spec}, boundary.shape);
-    spec.motion = [boundary, frame](double t) { return motion_at(boundary, frame, t); };
-    specs.push_back(spec);
-  }
-  return specs;
-}
 
 SceneParticles build_particles(Scene const& scene) {
   ParticleScene const& points = *scene.particles;
@@ -305,12 +228,9 @@ SceneParticles build_particles(Scene const& scene) {
                       .per_cell = body.per_cell,
                       .material = material[b]});
   }
-  try {
-    built.list = sample(bodies, points.spacing,
-                        {static_cast<std::uint64_t>(points.seed), points.check_overlap});
-  } catch (Error const& error) {
-    throw Error("{}: {}", scene.file.string(), error.what());
-  }
+  refuse_far(points, whole);
+  require_memory_for(scene, whole);
+  if (!bodies.empty()) built.list = sampled(scene, bodies);
   std::vector<std::mt19937_64> engines;
   for (SceneBody const& body : points.bodies) {
     engines.emplace_back(static_cast<std::uint64_t>(body.start ? body.start->seed : 0));
@@ -326,8 +246,17 @@ SceneParticles build_particles(Scene const& scene) {
       p.F(c, c) = body.start->least + unit * (body.start->most - body.start->least);
     }
   }
+  built.boundaries = boundary_specs(points);
   refuse_inside(points, built);
-  built.drawings = draw(points, built.list);
+  add_emitted(scene, material, built);
+  if (built.list.empty()) {
+    throw Error(
+        "{}: nothing comes out of the sources in {} s, and there is nothing else: let them "
+        "flow sooner, or take more frames",
+        scene.file.string(), scene.step * scene.frames);
+  }
+  refuse_blocked_sources(points, built);
+  built.drawings = draw_boundaries(points, built.list);
   return built;
 }
 
@@ -341,9 +270,14 @@ ResultMesh result_mesh(Scene const& scene, SceneParticles const& particles) {
     result.object.push_back(p.object);
   }
   result.particles = particles.list.size();
+  result.growing = !points.sources.empty();
   result.scalars = particle_scalars();
   for (SceneBody const& body : points.bodies) {
     result.object_names.push_back(body.name);
+    result.object_kind.push_back(ObjectKind::body);
+  }
+  for (SceneSource const& source : points.sources) {
+    result.object_names.push_back(source.name);
     result.object_kind.push_back(ObjectKind::body);
   }
   for (std::size_t k = 0; k < points.boundaries.size(); ++k) {

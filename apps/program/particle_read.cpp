@@ -1,4 +1,4 @@
-// [grid], [[object]] and [[boundary]] of a scene of material points.
+// [grid], [[object]], [[source]] and [[boundary]] of a scene of material points.
 #include <taut/apps/program/scene_read.hpp>
 #include <taut/core/report/error.hpp>
 #include <taut/materials/granular.hpp>
@@ -64,15 +64,17 @@ Plasticity read_plasticity(Section const& s) {
   return p;
 }
 
-void read_material(Section const& s, SceneBody& body) {
+/// The table `material` of a body or a source.
+template <class Owner>
+void read_material(Section const& s, Owner& owner) {
   s.allow({"model", "young", "poisson", "density", "plasticity"});
-  MaterialParameters& m = body.material;
+  MaterialParameters& m = owner.material;
   m.model = s.choice("model", particle_models(), std::string(particle_models().front()));
   m.young = s.number("young", {.min = 0, .max = 1e15, .open_min = true, .unit = "Pa"});
   m.poisson = s.number("poisson", {.min = -1, .max = 0.5, .open_min = true, .open_max = true});
   m.density = s.number("density", {.min = 0, .max = 1e9, .open_min = true, .unit = "kg/m^3"});
   if (auto const plasticity = s.section("plasticity")) {
-    body.plasticity = read_plasticity(*plasticity);
+    owner.plasticity = read_plasticity(*plasticity);
   }
 }
 
@@ -127,14 +129,14 @@ std::vector<SceneBody> read_body(Section const& s, Scene const& scene, double pe
   return copies_of(body, s);
 }
 
-SceneBoundary read_boundary(Section const& s) {
-  s.allow({"name", "shape", "scale", "rotate", "translate", "motion", "contact", "friction",
-           "release"});
-  SceneBoundary boundary;
-  boundary.where = s.where();
-  boundary.name = s.text("name");
+void read_boundary_shape(Section const& s, Scene const& scene, SceneBoundary& boundary) {
   double const scale = read_scale(s);
-  boundary.placement = read_placement(s);
+  boundary.max_holes = s.number("max_holes", {.min = 0, .max = 1}, 0.0);
+  if (!has_shape(s)) {
+    boundary.shape = read_file_name(s, scene);
+    boundary.scale = scale;
+    return;
+  }
   Section const shape(s.at("shape"), s.path("shape"));
   SceneValue const* kind = shape.find("kind");
   auto const* word = kind ? std::get_if<std::string>(&kind->value) : nullptr;
@@ -146,6 +148,40 @@ SceneBoundary read_boundary(Section const& s) {
     boundary.inside = shape.flag("inside", false);
     boundary.shape = read_shape_without_mesh(shape, scale, {"inside"});
   }
+}
+
+SceneSource read_source(Section const& s, double per_cell) {
+  s.allow({"name", "shape", "rotate", "translate", "motion", "velocity", "material", "per_cell",
+           "start", "end"});
+  SceneSource source;
+  source.where = s.where();
+  source.name = s.text("name");
+  source.placement = read_placement(s);
+  source.shape = read_shape_without_mesh(Section(s.at("shape"), s.path("shape")), 1);
+  if (std::holds_alternative<TorusShape>(source.shape))
+    throw Error(
+        "{}.shape is a torus, which what leaves it on one side enters on the other: take a box, a "
+        "sphere or a cylinder",
+        source.where);
+  source.motion = read_motion(s);
+  source.velocity = s.point("velocity", "m/s");
+  if (!(norm(source.velocity) > 0))
+    throw Error("{}: {} is 0: nothing would come out; give the velocity of the flow in m/s",
+                s.at("velocity").place, s.path("velocity"));
+  read_material(Section(s.at("material"), s.path("material")), source);
+  source.per_cell = s.number("per_cell", {.min = 0, .max = 1e3, .open_min = true}, per_cell);
+  source.window = read_window(s);
+  return source;
+}
+
+SceneBoundary read_boundary(Section const& s, Scene const& scene) {
+  s.allow({"name", "shape", "mesh", "max_holes", "scale", "rotate", "translate", "motion",
+           "contact", "friction", "release"});
+  SceneBoundary boundary;
+  boundary.where = s.where();
+  boundary.name = s.text("name");
+  boundary.placement = read_placement(s);
+  read_boundary_shape(s, scene, boundary);
   boundary.motion = read_motion(s);
   if (s.find("release")) {
     boundary.release = s.number("release", time_range);
@@ -173,6 +209,7 @@ void require_own_names(ParticleScene const& scene) {
     taken.emplace_back(name, where);
   };
   for (SceneBody const& body : scene.bodies) take(body.name, body.where);
+  for (SceneSource const& source : scene.sources) take(source.name, source.where);
   for (SceneBoundary const& boundary : scene.boundaries) take(boundary.name, boundary.where);
 }
 
@@ -183,7 +220,7 @@ std::span<std::string_view const> plasticity_kinds() { return kinds; }
 ParticleScene read_particle_scene(Section const& root, Scene const& scene) {
   Section const grid(root.at("grid"), "grid");
   grid.allow({"spacing", "kernel", "transfer", "flip", "per_cell", "cfl", "crossing",
-              "longest_step", "halvings", "seed", "check_overlap"});
+              "longest_step", "time_error", "halvings", "seed", "check_overlap"});
   ParticleScene p;
   p.spacing = grid.number("spacing", length_range) / scene.resolution;
   constexpr std::array<std::string_view, 1> kernels{"quadratic"};
@@ -198,15 +235,19 @@ ParticleScene read_particle_scene(Section const& root, Scene const& scene) {
   if (grid.find("longest_step"))
     p.longest_step =
         grid.number("longest_step", {.min = 0, .max = 1e6, .open_min = true, .unit = "s"});
+  if (grid.find("time_error"))
+    p.time_error = grid.number("time_error", {.min = 0, .max = 1e6, .open_min = true, .unit = "m"});
   p.halvings = grid.integer("halvings", {.min = 0, .max = 60}, p.halvings);
   p.seed = grid.integer("seed", {.min = 0, .max = 1e9}, p.seed);
   p.check_overlap = grid.flag("check_overlap", p.check_overlap);
   for (Section const& object : root.list("object"))
     for (SceneBody& copy : read_body(object, scene, per_cell)) p.bodies.push_back(std::move(copy));
-  if (p.bodies.empty())
-    throw Error("{}: the scene has no objects: add an [[object]]", root.place());
+  for (Section const& source : root.list("source"))
+    p.sources.push_back(read_source(source, per_cell));
+  if (p.bodies.empty() && p.sources.empty())
+    throw Error("{}: the scene has no objects: add an [[object]], or a [[source]]", root.place());
   for (Section const& boundary : root.list("boundary"))
-    p.boundaries.push_back(read_boundary(boundary));
+    p.boundaries.push_back(read_boundary(boundary, scene));
   require_own_names(p);
   return p;
 }

@@ -23,7 +23,14 @@ public:
 
 private:
   Simulation& simulation() override { return *simulation_; }
-  NewtonReport step() override { return simulation_->step(); }
+  NewtonReport step() override {
+    try {
+      return simulation_->step();
+    } catch (Error const&) {
+      write_frame_off_grid();  // the state before what cannot be done
+      throw;
+    }
+  }
 
   void add_to_line(Record& line) override {
     ParticleFrame const& frame = simulation_->frame();
@@ -33,7 +40,7 @@ private:
     line.set("grid_steps", frame.steps)
         .set("grid_steps_converged", frame.converged_steps)
         .set("halvings", frame.halvings)
-        .set("particles", particles_.list.size())
+        .set("particles", simulation_->particle_count())
         .set("nodes", frame.nodes)
         .set("travel_cells", frame.travel_cells);
     if (!scene_.output.check) return;
@@ -46,12 +53,16 @@ private:
   void append_frame(ResultWriter& result) override {
     result.append(simulation_->time(), simulation_->positions(), simulation_->velocities(),
                   simulation_->scalars());
+    if (!scene_.output.vdb) return;
+    write_grid(folder() / "vdb" / fmt::format("frame_{:05}.vdb", simulation_->steps()),
+               simulation_->grid());
   }
 
   void add_to_summary(Record& summary) const override {
     double mass = 0;
-    for (Particle const& p : particles_.list) mass += p.mass;
-    summary.set("particles", particles_.list.size())
+    std::size_t const count = simulation_->particle_count();
+    for (std::size_t p = 0; p < count; ++p) mass += particles_.list[p].mass;
+    summary.set("particles", count)
         .set("nodes", static_cast<std::int64_t>(totals().most_nodes))
         .set("mass_kg", mass)
         .set("preconditioner", particle_preconditioner(scene_.solver))
@@ -64,7 +75,8 @@ private:
 
   void say_more() const override {
     fmt::print("grid     {:.0f} steps, {:.0f} halvings; {} particles, {:.0f} nodes at most\n",
-               totals().grid_steps, totals().halvings, particles_.list.size(), totals().most_nodes);
+               totals().grid_steps, totals().halvings, simulation_->particle_count(),
+               totals().most_nodes);
     if (totals().inverted_steps > 0) {
       fmt::print("inverted particles in {:.0f} of {:.0f} steps, at most {:.0f} at a time\n",
                  totals().inverted_steps, totals().steps, totals().most_inverted);

@@ -5,8 +5,11 @@
 #include <taut/materials/invariants.hpp>
 #include <taut/mpm/particle_stepper.hpp>
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <cmath>
+#include <span>
 
 namespace taut {
 namespace {
@@ -27,6 +30,38 @@ AnyTransfer transfer_of(ParticleScene const& scene) {
   return {};
 }
 
+/// What comes out of a source in a step has gone on with the flow since then.
+template <class S, class Scalar>
+struct ComeOut {
+  VectorField<Scalar, S> x, v;
+  Kokkos::View<double const*, typename S::memory> born;
+  int first;
+  double time;
+  KOKKOS_FUNCTION void operator()(int k) const {
+    int const p = first + k;
+    for (int c = 0; c < 3; ++c) {
+      x(p, c) += static_cast<Scalar>((time - born(p)) * double(v(p, c)));
+    }
+  }
+};
+
+/// Mass-weighted squares of what nodes gain in velocity, and their mass.
+template <class S, class Precision>
+struct Gained {
+  using Scalar = typename Precision::position;
+  VectorField<Scalar, S> before, after;
+  Array<typename Precision::real, S> mass;
+  KOKKOS_FUNCTION void operator()(int n, Sums<double, 2>& sums) const {
+    double square = 0;
+    for (int c = 0; c < 3; ++c) {
+      double const gain = double(after(n, c)) - double(before(n, c));
+      square += gain * gain;
+    }
+    sums[0] += double(mass(n)) * square;
+    sums[1] += double(mass(n));
+  }
+};
+
 class ParticleSimulationOf final : public ParticleSimulation {
 public:
   using P = ParticlePrecision;
@@ -38,14 +73,24 @@ public:
   ParticleSimulationOf(Scene const& scene, SceneParticles const& start)
       : scene_(scene),
         points_(*scene.particles),
-        drawings_(start.drawings),
+        start_(start),
         particles_(start.list),
+        born_("particle_born", start.born.size()),
         grid_(points_.spacing, particle_lanes()),
         potential_(make_potential(start)),
-        boundaries_(boundary_specs(points_)),
+        boundaries_(start.boundaries),
         stepper_(ImplicitEuler<ParticleMinimiser>(scene.solver, lagging()),
                  {points_.cfl, points_.crossing, points_.halvings}, transfer_of(points_),
-                 Flows(start.flows)) {}
+                 Flows(start.flows)) {
+    auto const born = Kokkos::create_mirror_view(born_);
+    for (std::size_t p = 0; p < start.born.size(); ++p) born(p) = start.born[p];
+    Kokkos::deep_copy(born_, born);
+    particles_.count = static_cast<int>(start.initial());
+    for (std::size_t p = start.initial(); p < start.list.size(); ++p) {
+      source_speed_ = std::max(source_speed_, norm(start.list[p].v));
+    }
+    let_out();
+  }
 
   NewtonReport step(IterationObserver const& observer) override {
     Observer<P, S> const inner = observer_of(observer);
@@ -53,14 +98,23 @@ public:
     NewtonReport all;
     frame_ = {};
     while (time_ < end) {
+      if (particles_.count == 0) {
+        wait(end);
+        continue;
+      }
       auto const report = step_of_grid(end, inner);
       time_ = report.time_step >= end - time_ ? end : time_ + report.time_step;
+      let_out();
       add(report.minimiser, all);
       ++frame_.steps;
       frame_.converged_steps += report.minimiser.converged();
       frame_.halvings += report.halvings;
       frame_.nodes = std::max(frame_.nodes, report.nodes);
       frame_.travel_cells = std::max(frame_.travel_cells, report.travel_cells);
+    }
+    if (frame_.steps == 0) {  // nothing is there yet
+      all.stop = Stop::converged_by_gradient;
+      all.error_estimate_m = all.error_estimate_mps = 0;
     }
     ++steps_;
     return all;
@@ -80,15 +134,16 @@ public:
   std::optional<ContactReport> contact() const override { return {}; }
   ParticleFrame const& frame() const override { return frame_; }
   std::vector<Particle> particles() const override { return particles_.read(); }
+  std::size_t particle_count() const override { return static_cast<std::size_t>(particles_.count); }
 
   std::vector<Point> positions() const override {
     std::vector<Point> all;
     for (Particle const& p : particles_.read()) all.push_back({p.x[0], p.x[1], p.x[2]});
-    for (std::size_t k = 0; k < drawings_.size(); ++k) {
+    for (std::size_t k = 0; k < start_.drawings.size(); ++k) {
       SceneBoundary const& boundary = points_.boundaries[k];
       // What has been taken away is drawn where it was last.
       RigidMap const map = boundary.motion.at(std::min(time_, boundary.release.value_or(time_)));
-      for (Point const& x : drawings_[k].points) all.push_back(map(x));
+      for (Point const& x : start_.drawings[k].points) all.push_back(map(x));
     }
     return all;
   }
@@ -113,9 +168,31 @@ public:
     return all;
   }
 
+  GridOutput grid() const override {
+    GridOutput output;
+    output.dx = points_.spacing;
+    std::vector<Particle> const list = particles_.read();
+    for (Particle const& p : list) {
+      output.particle.push_back(p.x);
+      output.volume += p.volume / static_cast<double>(list.size());
+    }
+    if (frame_.steps == 0) return output;
+    auto const ijk = Kokkos::create_mirror_view_and_copy(Kokkos::HostSpace(), grid_.nodes().ijk);
+    auto const mass =
+        Kokkos::create_mirror_view_and_copy(Kokkos::HostSpace(), grid_.unknowns().mass);
+    auto const v = Kokkos::create_mirror_view_and_copy(Kokkos::HostSpace(), stepper_.nodes().v);
+    for (int n = 0; n < grid_.size(); ++n) {
+      output.node.push_back({ijk(n, 0), ijk(n, 1), ijk(n, 2)});
+      output.mass.push_back(mass(n));
+      output.velocity.push_back({v(n, 0), v(n, 1), v(n, 2)});
+    }
+    return output;
+  }
+
   void save(Checkpoint& checkpoint) const override {
     checkpoint.set("time", std::vector<double>{time_});
     checkpoint.set("steps", std::vector<std::int32_t>{steps_});
+    checkpoint.set("next_step", std::vector<double>{next_});
     std::vector<double> numbers;
     for (Particle const& p : particles_.read()) {
       for (int c = 0; c < 3; ++c) numbers.push_back(p.x[c]);
@@ -128,17 +205,21 @@ public:
     checkpoint.set("particles", numbers);
   }
   void restore(Checkpoint const& checkpoint) override {
-    std::vector<Particle> list = particles_.read();
+    std::vector<Particle> list = start_.list;
     auto const& numbers = checkpoint.get<double>("particles");
     constexpr std::size_t each = 3 + 3 + 9 + 9 + 2;
-    if (numbers.size() != each * list.size()) {
+    time_ = checkpoint.number<double>("time");
+    steps_ = checkpoint.number<std::int32_t>("steps");
+    next_ = checkpoint.number<double>("next_step");
+    std::size_t const count = start_.count_at(time_);
+    if (numbers.size() != each * count) {
       throw Error(
           "the checkpoint holds {} numbers of particles, the scene needs {}; start the run "
           "again",
-          numbers.size(), each * list.size());
+          numbers.size(), each * count);
     }
     auto next = numbers.begin();
-    for (Particle& p : list) {
+    for (Particle& p : std::span(list).first(count)) {
       for (int c = 0; c < 3; ++c) p.x[c] = *next++;
       for (int c = 0; c < 3; ++c) p.v[c] = *next++;
       for (double& entry : p.C.a) entry = *next++;
@@ -147,8 +228,7 @@ public:
       p.plastic = *next++;
     }
     particles_ = Particles<P, S>(list);
-    time_ = checkpoint.number<double>("time");
-    steps_ = checkpoint.number<std::int32_t>("steps");
+    particles_.count = static_cast<int>(count);
   }
 
 private:
@@ -188,20 +268,92 @@ private:
     return {friction ? 2 : 1};
   }
 
+  /// What has come out of the sources by now is there.
+  void let_out() {
+    int const first = particles_.count, count = static_cast<int>(start_.count_at(time_)) - first;
+    for_each<S>("come_out", count,
+                ComeOut<S, P::position>{particles_.x, particles_.v, born_, first, time_});
+    particles_.count += count;
+  }
+  /// Until something is there, at most to the end of the frame.
+  void wait(double end) {
+    time_ = std::clamp(start_.born.front(), time_, end);
+    let_out();
+  }
+
   /// One step towards the end of the frame. The last two steps share what is left, so that none is
   /// tiny.
   ParticleStepReport<NewtonReport> step_of_grid(double end, Observer<P, S> const& observer) {
     double const left = end - time_;
-    double const longest = points_.longest_step.value_or(left);
+    double longest = points_.longest_step.value_or(left);
+    if (particles_.count < std::ssize(start_.list) && source_speed_ * longest > reach()) {
+      longest = reach() / source_speed_;
+    }
     // What round-off has added to the frame is no step of its own.
     double h = stepper_.cfl_step(particles_, points_.spacing,
                                  left <= longest * (1 + 1e-9) ? left : longest);
+    if (points_.time_error && next_ > 0) h = std::min(h, next_);
     if (h < left && 2 * h > left) h = left / 2;
+    if (!points_.time_error) return try_step(h, observer);
+    std::vector<Particle> const before = particles_.read();
+    for (int refused = 0;; ++refused) {
+      auto report = try_step(h, observer);
+      double const error = error_of(report.time_step), asked = *points_.time_error;
+      // It is of second order.
+      next_ = report.time_step * std::clamp(0.9 * std::sqrt(asked / error), 0.2, 2.0);
+      report.halvings += refused;
+      if (error <= asked) return report;
+      take_back(before);
+      if (refused == points_.halvings) {
+        throw Error(
+            "step {} at {:.6g} s: a step of {:.3g} s is off by {:.3g} m, more than grid.time_error "
+            "asks for, and was shortened {} times: allow a larger error, or more halvings",
+            steps_ + 1, time_, report.time_step, error, refused);
+      }
+      h = next_;
+    }
+  }
+  /// m, how far the fastest goes in a step.
+  double reach() const { return points_.cfl * points_.spacing; }
+
+  ParticleStepReport<NewtonReport> try_step(double h, Observer<P, S> const& observer) {
     try {
       return stepper_.step(potential_, grid_, particles_, h, boundaries_, time_, observer);
     } catch (Error const& error) {
-      throw Error("step {} at {:.6g} s: {}", steps_ + 1, time_, error.what());
+      throw Error("step {} at {:.6g} s: {}. {}", steps_ + 1, time_, error.what(), fastest_one());
     }
+  }
+  /// How far the end of a step is from where its forces, as they change over it, would have led:
+  /// implicit Euler takes those at the end for all of it. Mass-weighted, m.
+  double error_of(double h) {
+    reducer_.provide(grid_.size(), 2);
+    auto const& nodes = stepper_.nodes();
+    auto const sums = reducer_.sum<2>(
+        "gained", grid_.size(), Gained<S, P>{grid_.velocity(), nodes.v, grid_.unknowns().mass});
+    return sums[1] > 0 ? 0.5 * h * std::sqrt(sums[0] / sums[1]) : 0;
+  }
+  void take_back(std::vector<Particle> const& before) {
+    std::vector<Particle> list = start_.list;
+    std::copy(before.begin(), before.end(), list.begin());
+    particles_ = Particles<P, S>(list);
+    particles_.count = static_cast<int>(before.size());
+  }
+  /// A sentence about the particle that something is most likely wrong with.
+  std::string fastest_one() const {
+    std::vector<Particle> const list = particles_.read();
+    auto const worse = [](Particle const& a, Particle const& b) {
+      double const speed = norm(b.v);
+      return !std::isfinite(speed) || norm(a.v) < speed;
+    };
+    auto const p = std::max_element(list.begin(), list.end(), worse);
+    auto const object = static_cast<std::size_t>(p->object);
+    return fmt::format(
+        "The fastest is particle {} of {}, at ({:.4g}, {:.4g}, {:.4g}) m with {:.3g} "
+        "m/s",
+        p - list.begin(),
+        object < points_.bodies.size() ? points_.bodies[object].name
+                                       : points_.sources[object - points_.bodies.size()].name,
+        p->x[0], p->x[1], p->x[2], norm(p->v));
   }
 
   /// Sums, and the worst of what does not add up.
@@ -229,19 +381,23 @@ private:
   }
   std::size_t drawn() const {
     std::size_t points = 0;
-    for (TriangleMesh const& drawing : drawings_) points += drawing.points.size();
+    for (TriangleMesh const& drawing : start_.drawings) points += drawing.points.size();
     return points;
   }
 
   Scene scene_;
   ParticleScene points_;
-  std::vector<TriangleMesh> drawings_;
-  Particles<P, S> particles_;
+  SceneParticles start_;
+  Particles<P, S> particles_;              ///< all there will ever be; `count` of them are there
+  Kokkos::View<double*, S::memory> born_;  ///< s
   ProgramGrid grid_;
   ParticlePotential potential_;
   BoundaryList<S> boundaries_;
   Stepper stepper_;
   ParticleFrame frame_;
+  double source_speed_ = 0;  ///< of what comes out of sources, the largest, m/s
+  double next_ = 0;          ///< s, the step that points_.time_error asks for; 0: not known yet
+  Reducer<S> reducer_;
   double time_ = 0;
   int steps_ = 0;
 };

@@ -4,6 +4,7 @@
 
 #include <taut/apps/program/particle_geometry.hpp>
 #include <taut/apps/program/simulation.hpp>
+#include <taut/mpm/grid_output.hpp>
 
 namespace taut {
 
@@ -30,8 +31,9 @@ public:
 
   /// Of the frame that ended last.
   virtual ParticleFrame const& frame() const = 0;
+  /// Those that are there, in the order of SceneParticles::list.
   virtual std::vector<Particle> particles() const = 0;
-
+  virtual std::size_t particle_count() const = 0;
   /// The first step of the grid that the next frame takes, for charts; what comes after it is not
   /// taken, and the frame is not counted.
   virtual NewtonReport first_step(IterationObserver const& observer) = 0;
@@ -40,6 +42,8 @@ public:
   virtual NodesOfStep start_nodes() = 0;
   /// Of each point of the scene's result (result_mesh), in the order of particle_scalars().
   virtual std::vector<std::vector<double>> scalars() const = 0;
+  /// The grid of the last step, none before the first, and the particles as they are.
+  virtual GridOutput grid() const = 0;
 };
 
 /// Particles with J <= 0, or of which something is not a number, ascending.

@@ -5,6 +5,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <span>
 
 namespace taut {
 namespace {
@@ -92,7 +93,8 @@ std::string run_identity(SceneChanges const& changes, Scene const& scene,
 std::string run_identity(SceneChanges const& changes, Scene const& scene,
                          SceneParticles const& particles) {
   std::vector<double> numbers;
-  for (Particle const& p : particles.list) {
+  // What comes out of sources follows from the text, and from how long the run is.
+  for (Particle const& p : std::span(particles.list).first(particles.initial())) {
     for (int c = 0; c < 3; ++c) numbers.push_back(p.x[c]);
     numbers.push_back(p.mass);
   }

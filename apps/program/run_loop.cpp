@@ -42,9 +42,13 @@ void clear_folder(std::filesystem::path const& folder) {
   for (char const* name : {"checkpoint.h5", "summary.json", "report.jsonl"})
     std::filesystem::remove(folder / name);
   std::error_code none;
-  for (auto const& entry : std::filesystem::directory_iterator(folder / "obj", none)) {
-    std::string const name = entry.path().filename().string();
-    if (name.starts_with("frame_") && name.ends_with(".obj")) std::filesystem::remove(entry.path());
+  for (std::string const kind : {"obj", "vdb"}) {
+    for (auto const& entry : std::filesystem::directory_iterator(folder / kind, none)) {
+      std::string const name = entry.path().filename().string();
+      if (name.starts_with("frame_") && name.ends_with("." + kind)) {
+        std::filesystem::remove(entry.path());
+      }
+    }
   }
 }
 

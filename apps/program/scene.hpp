@@ -172,14 +172,32 @@ struct SceneBody {
   std::optional<StartStretched> start;
 };
 
+/// Lets material points out: a cloud of them flows through a convex shape, and what leaves the
+/// shape is there from then on. The nodes of the grid in it move with the flow.
+struct SceneSource {
+  std::string where;
+  std::string name;
+  Shape shape;         ///< a box, a ball or a cylinder, in a frame of its own
+  RigidMap placement;  ///< at time 0
+  RigidMotion motion;  ///< from there; turns the flow as well
+  Point velocity;      ///< of the flow in the shape, as it is placed at time 0, m/s; not zero
+  MaterialParameters material;
+  Plasticity plasticity;
+  double per_cell = 8;  ///< particles in a cell
+  Window window;        ///< in which it flows
+};
+
 enum class BoundaryLaw { stick, slip, separate };
 
-/// What holds the nodes of the grid: solid inside of its shape, or outside.
+/// What holds the nodes of the grid: solid inside of its shape, or outside. A file is a closed
+/// surface (.obj) or a level set (.vdb), which is solid inside.
 struct SceneBoundary {
   std::string where;
   std::string name;
-  std::variant<HalfSpaceShape, Shape> shape;  ///< in a frame of its own
-  bool inside = false;                        ///< the bodies are inside of it
+  std::variant<HalfSpaceShape, Shape, std::filesystem::path> shape;  ///< in a frame of its own
+  double scale = 1;      ///< of a file; other shapes are scaled already
+  double max_holes = 0;  ///< as of a body
+  bool inside = false;   ///< the bodies are inside of it
   BoundaryLaw law = BoundaryLaw::stick;
   double friction = 0;
   RigidMap placement;             ///< at time 0
@@ -194,16 +212,19 @@ struct ParticleScene {
   double flip = 0.95;                  ///< of transfer = "flip"
   double cfl = 0.6, crossing = 1;      ///< cells (mpm/particle_stepper.hpp)
   std::optional<double> longest_step;  ///< s; a frame if not given
+  std::optional<double> time_error;  ///< of a step, m; steps are as long as the above allow without
   int halvings = 10;
   int seed = 1;  ///< of the places of particles
   bool check_overlap = true;
   std::vector<SceneBody> bodies;
+  std::vector<SceneSource> sources;
   std::vector<SceneBoundary> boundaries;
 };
 
 struct OutputOptions {
   int every = 1;      ///< frames between written frames
   bool obj = false;   ///< also a surface per written frame
+  bool vdb = false;   ///< also the grid of material points and their surface per written frame
   bool check = true;  ///< look for inverted elements and non-finite values
 };
 

@@ -20,10 +20,11 @@ void read_time(Section const& time, Scene& scene) {
 }
 
 OutputOptions read_output(Section const& section) {
-  section.allow({"every", "obj", "check"});
+  section.allow({"every", "obj", "vdb", "check"});
   OutputOptions output;
   output.every = section.integer("every", {.min = 1, .max = 1e9, .unit = "frames"}, output.every);
   output.obj = section.flag("obj", output.obj);
+  output.vdb = section.flag("vdb", output.vdb);
   output.check = section.flag("check", output.check);
   return output;
 }
@@ -68,6 +69,11 @@ void read_rest(Section const& root, Scene& scene) {
   if (auto const solver = root.section("solver")) scene.solver = SolverOptions(*solver);
   if (auto const output = root.section("output")) scene.output = read_output(*output);
   if (auto const sweep = root.section("sweep")) scene.sweep = read_sweep(*sweep);
+  if (scene.output.vdb && !scene.particles)
+    throw Error(
+        "{}: output.vdb writes the grid of material points, and a scene of meshes has none: leave "
+        "it out, or use output.obj",
+        root.at("output").place);
 }
 
 /// A scene with a table [grid].
@@ -103,7 +109,8 @@ Scene resolve_particles(Section const& root, Scene scene) {
 Scene resolve(SceneValue const& document, std::filesystem::path const& file) {
   Section const root(document, "");
   root.allow({"name", "description", "base", "gravity", "resolution", "time", "object", "obstacle",
-              "pin", "force", "contact", "solver", "output", "small", "sweep", "grid", "boundary"});
+              "pin", "force", "contact", "solver", "output", "small", "sweep", "grid", "boundary",
+              "source"});
   Scene scene;
   scene.file = file;
   scene.name = root.text("name", file.stem().string());
@@ -118,6 +125,11 @@ Scene resolve(SceneValue const& document, std::filesystem::path const& file) {
         "{}: a [[boundary]] holds the nodes of a grid, which a scene of meshes does not have: add "
         "a table [grid], or make it an [[obstacle]]",
         boundary->place);
+  if (SceneValue const* source = root.find("source"))
+    throw Error(
+        "{}: a [[source]] lets out material points, which a scene of meshes does not have: add a "
+        "table [grid], or leave it out",
+        source->place);
   for (Section const& object : root.list("object"))
     for (SceneObject& copy : read_object(object, scene)) scene.objects.push_back(std::move(copy));
   if (scene.objects.empty())

@@ -143,7 +143,16 @@ class Points:
         return float(np.median(distances)) if distances else 1.0
 
     def move(self, points):
-        self.mesh.points = points[self.vertex]
+        """Those in `vertex`, which may be more than before."""
+        if self.mesh.n_points == len(self.vertex):
+            self.mesh.points = points[self.vertex]
+            return
+        fresh = pv.PolyData()
+        if len(self.vertex):
+            fresh = pv.PolyData(points[self.vertex])
+            fresh["colour"] = np.zeros((len(self.vertex), 3), dtype=np.uint8)
+            fresh.set_active_scalars("colour")
+        self.mesh.ShallowCopy(fresh)
 
     def refine(self, length):
         """They are as fine as they are."""
@@ -153,7 +162,8 @@ class Points:
 
     def paint(self, light, base, least):
         """Balls have a light and a dark side of their own; what is deep between others is not seen."""
-        self.fine["colour"][:] = base.round()
+        if self.mesh.n_points:
+            self.fine["colour"][:] = base[:self.mesh.n_points].round()
         self.fine.Modified()
 
 
@@ -205,6 +215,8 @@ class Frames:
         self.reader.UpdateInformation()
         self.count = self.reader.GetNumberOfSteps()
         grid = self.read(0)
+        if self.read(self.count - 1).n_points != grid.n_points:
+            grid = self.read(self.count - 1)  # sources have let out more: there are all that come
         grid["vertex"] = np.arange(grid.n_points)
         self.rest = np.array(grid.points)
         objects = np.array(grid["object"]).astype(int)
@@ -222,6 +234,7 @@ class Frames:
                 room |= cells
         self.room = Surface(grid, room) if room.any() else None
         self.velocity = np.zeros_like(self.rest)
+        self.all, self.seen = self.bodies.vertex, 0
 
     def __len__(self):
         return self.count
@@ -234,12 +247,25 @@ class Frames:
     def load(self, frame):
         """Moves everything to the frame."""
         grid = self.read(frame)
-        points = np.array(grid.points)
+        missing = len(self.rest) - grid.n_points  # particles that are yet to come out of sources
+        there = len(self.all) - missing if missing else None
+        if self.of_points:
+            self.bodies.vertex = self.all[:there]
+
+        def spread(values):
+            """Leaves room for what is not there yet: the particles are the first of the points."""
+            gap = np.zeros((missing, 3))
+            return np.concatenate([values[:there], gap, values[there:]]) if missing else values
+
+        points = spread(np.array(grid.points))
+        if there is not None and there > self.seen:  # displaced from where they were seen first
+            self.rest[self.seen:there] = points[self.seen:there]
+            self.seen = there
         for part in (self.bodies, self.obstacles, self.room, *self.planes):
             if part is not None:
                 part.move(points)
         if "velocity" in grid.point_data:
-            self.velocity = np.array(grid.point_data["velocity"])
+            self.velocity = spread(np.array(grid.point_data["velocity"]))
 
     def field(self, name):
         vertex = self.bodies.vertex
@@ -260,12 +286,13 @@ class Picture:
         for done, frame in enumerate(drawn):
             say(f"looking at frame {frame}", done, len(drawn))
             frames.load(frame)
-            bodies.append(extremes(frames.bodies.mesh.points))
+            if frames.bodies.mesh.n_points:  # else all is yet to come out of sources
+                bodies.append(extremes(frames.bodies.mesh.points))
             if frames.obstacles and not (framed and np.array_equal(framed[-1],
                                                                    frames.obstacles.mesh.points)):
                 framed.append(np.array(frames.obstacles.mesh.points))
             if self.colour != "object":
-                self.top = max(self.top, frames.field(self.colour).max())
+                self.top = max(self.top, frames.field(self.colour).max(initial=0))
         bodies = np.concatenate(bodies)
         low, high = bodies.min(axis=0), bodies.max(axis=0)
         self.middle, self.reach = 0.5 * (low + high), 0.5 * np.linalg.norm(high - low) or 1
@@ -392,7 +419,8 @@ class Picture:
         """The picture of a frame, [height][width][rgb]."""
         frames = self.frames
         frames.load(frame)
-        self.light.aim(frames.bodies.mesh.points)
+        casters = frames.bodies.mesh
+        self.light.aim(casters.points if casters.n_points else self.middle[None])
         if self.colour != "object":
             values = frames.bodies.mean(frames.field(self.colour)) / (self.top or 1)
             self.base = 255 * matplotlib.colormaps["viridis"](values)[:, :3]

@@ -167,12 +167,14 @@ hsize_t stored_values(hid_t dataset, std::string const& name) {
 
 void write_rows(hid_t dataset, hid_t type, hsize_t first, hsize_t rows, void const* data,
                 std::string const& what) {
+  if (rows == 0) return;
   const auto [file, memory] = select_rows(dataset, first, rows, what);
   check(H5Dwrite(dataset, type, memory, file, H5P_DEFAULT, data), what);
 }
 
 void read_rows(hid_t dataset, hid_t type, hsize_t first, hsize_t rows, void* data,
                std::string const& what) {
+  if (rows == 0) return;
   const auto [file, memory] = select_rows(dataset, first, rows, what);
   check(H5Dread(dataset, type, memory, file, H5P_DEFAULT, data), what);
 }

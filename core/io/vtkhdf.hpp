@@ -12,6 +12,9 @@
 // XDMF's form of mixed cells would need a second copy of them: the sidecar shows the particles
 // alone if there are any, else the tets.
 //
+// Where particles come out of sources, each frame has points and cells of its own: the first of the
+// particles, as many as there are by then, and the triangles.
+//
 // A run may be killed at any moment, or its disk may fill: every finished frame stays readable. The
 // file has its final layout from the start, laid out for `capacity` frames (unwritten ones are
 // holes that take no disk space). A frame is first written to its own place; one write of one file
@@ -45,6 +48,8 @@ struct ResultMesh {
   std::vector<ObjectKind> object_kind = {};  ///< per object; empty: all are bodies
   std::size_t particles = 0;                 ///< the first of mesh.points, each a cell
   std::vector<std::string> scalars = {};     ///< names of what else each point has in each frame
+  /// Frames have the first of the particles alone, those that are there by then. No tets then.
+  bool growing = false;
 
   ObjectKind kind(std::size_t object_number) const {
     return object_kind.empty() ? ObjectKind::body : object_kind.at(object_number);
@@ -63,7 +68,8 @@ public:
                              std::int64_t capacity, IfExists if_exists, bool velocities = true);
 
   /// Goes on with an existing result after its first `frames` frames; later ones are dropped.
-  /// Throws Error if the file is not a result of the same mesh or has fewer frames.
+  /// Throws Error if the file is not a result of the same mesh or has fewer frames. A growing mesh
+  /// may have more particles than before, or fewer, behind those that both have.
   static ResultWriter resume(std::filesystem::path const& path, ResultMesh const& mesh,
                              std::int64_t frames, std::int64_t capacity);
 
@@ -72,7 +78,8 @@ public:
   ~ResultWriter();
 
   /// Appends the frame at `time` (s): positions (m), velocities (m/s; empty if the result has none)
-  /// and a list of numbers for each of its scalars, one per point. Throws Error if it cannot be
+  /// and a list of numbers for each of its scalars, one per point; in a growing result, for as many
+  /// particles as there are by now and the points behind them. Throws Error if it cannot be
   /// written; the earlier frames are then intact.
   void append(double time, std::span<Point const> positions, std::span<Point const> velocities,
               std::span<std::vector<double> const> scalars = {});
@@ -98,8 +105,11 @@ public:
   std::vector<double> const& times() const;  ///< s, one per frame
   ResultMesh const& mesh() const;            ///< points: at t = 0; a kind for every object
   bool has_velocities() const;
+  /// Of mesh().particles, how many are there in this frame; they are the first of its points.
+  std::size_t particles(std::int64_t frame) const;
 
-  /// One per point; 0 <= frame < frames(). Throws Error otherwise, or if the file cannot be read.
+  /// One per point of the frame; 0 <= frame < frames(). Throws Error otherwise, or if the file
+  /// cannot be read.
   std::vector<Point> positions(std::int64_t frame) const;   ///< m
   std::vector<Point> velocities(std::int64_t frame) const;  ///< m/s
   /// Of mesh().scalars. Throws Error for another name, too.

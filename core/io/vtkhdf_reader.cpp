@@ -19,7 +19,8 @@ std::vector<Point> read_points(hid_t dataset, std::int64_t first, std::size_t ro
   return points;
 }
 
-/// Throws Error unless `dataset` holds one vector, or one number, per point and frame.
+/// Throws Error unless `dataset` holds one vector, or one number, per point and frame; in a growing
+/// result there is room for as many.
 void check_shape(hid_t dataset, std::size_t points, std::int64_t frames, bool vectors = true) {
   const hdf5::Shape shape = hdf5::shape_of(dataset);
   hdf5::stored_values(dataset, "its point data");
@@ -67,7 +68,9 @@ ResultMesh read_mesh(hid_t file) {
   result.mesh.points = read_points(points, 0, shape[0]);
   result.object_names = hdf5::read_strings(file, "taut/object_names");
   result.object_kind = read_kinds(file, result.object_names.size());
-  result.object = hdf5::read_dataset<std::int32_t>(file, "VTKHDF/CellData/object");
+  result.growing = H5Lexists(file, "taut/growing", H5P_DEFAULT) > 0;
+  result.object = hdf5::read_dataset<std::int32_t>(
+      file, result.growing ? "taut/object" : "VTKHDF/CellData/object");
   const auto below = [](std::vector<std::int32_t> const& numbers, std::size_t end) {
     return std::all_of(numbers.begin(), numbers.end(), [&](std::int32_t number) {
       return number >= 0 && static_cast<std::size_t>(number) < end;
@@ -75,6 +78,24 @@ ResultMesh read_mesh(hid_t file) {
   };
   if (!below(result.object, result.object_names.size()))
     throw Error("its cells are of objects that do not exist");
+  if (H5Lexists(file, "taut/scalars", H5P_DEFAULT) > 0) {
+    result.scalars = hdf5::read_strings(file, "taut/scalars");
+  }
+  if (result.growing) {
+    const auto count = hdf5::read_dataset<std::int64_t>(file, "taut/growing");
+    const auto corners = hdf5::read_dataset<std::int32_t>(file, "taut/triangles");
+    if (count.size() != 1 || count[0] < 0 ||
+        static_cast<std::size_t>(count[0]) > result.mesh.points.size() || corners.size() % 3 != 0 ||
+        result.object.size() != static_cast<std::size_t>(count[0]) + corners.size() / 3 ||
+        !below(corners, result.mesh.points.size())) {
+      throw Error("its cells are not those of its points");
+    }
+    result.particles = static_cast<std::size_t>(count[0]);
+    for (std::size_t i = 0; i < corners.size(); i += 3) {
+      result.triangles.push_back({corners[i], corners[i + 1], corners[i + 2]});
+    }
+    return result;
+  }
 
   const auto types = hdf5::read_dataset<std::uint8_t>(file, "VTKHDF/Types");
   const auto [particles, tets, triangles] = count_cells(types);
@@ -85,9 +106,6 @@ ResultMesh read_mesh(hid_t file) {
     throw Error("its cells are not those of its points");
   }
   result.particles = particles;
-  if (H5Lexists(file, "taut/scalars", H5P_DEFAULT) > 0) {
-    result.scalars = hdf5::read_strings(file, "taut/scalars");
-  }
   result.mesh.tets.reserve(tets);
   for (std::size_t i = of_tets; i < of_triangles; i += 4) {
     result.mesh.tets.push_back({ids[i], ids[i + 1], ids[i + 2], ids[i + 3]});
@@ -125,6 +143,7 @@ struct ResultReader::File {
         scalars_.push_back(hdf5::open_dataset(point_data, name));
         check_shape(scalars_.back(), mesh_.mesh.points.size(), frames, false);
       }
+      if (mesh_.growing) read_counts(frames);
     } catch (Error const& error) {
       throw Error(
           "{}: this is no result of a run that can be read, because {}; name the .vtkhdf "
@@ -133,23 +152,38 @@ struct ResultReader::File {
     }
   }
 
+  /// How many points the frames of a growing result have.
+  void read_counts(std::int64_t frames) {
+    const auto numbers = hdf5::read_dataset<std::int64_t>(file_, "VTKHDF/NumberOfPoints");
+    const std::size_t all = mesh_.mesh.points.size(), least = all - mesh_.particles;
+    if (std::ssize(numbers) < frames) throw Error("not every frame says how many points it has");
+    for (std::int64_t k = 0; k < frames; ++k) {
+      const auto count = static_cast<std::size_t>(numbers[static_cast<std::size_t>(k)]);
+      if (count < least || count > all) throw Error("frame {} has {} of {} points", k, count, all);
+      counts_.push_back(count);
+    }
+  }
+  std::size_t points_of(std::int64_t frame) const {
+    require(frame);
+    return mesh_.growing ? counts_[static_cast<std::size_t>(frame)] : mesh_.mesh.points.size();
+  }
+
   void require(std::int64_t frame) const {
     if (frame >= 0 && frame < std::ssize(times_)) return;
     throw Error("{}: there is no frame {}, the result has {} (counted from 0).", path_.string(),
                 frame, times_.size());
   }
   std::vector<Point> read(hid_t dataset, std::int64_t frame) const {
-    require(frame);
+    const std::size_t count = points_of(frame);
     const hdf5::Quiet quiet;
-    const std::size_t n = mesh_.mesh.points.size();
-    return read_points(dataset, frame * static_cast<std::int64_t>(n), n);
+    return read_points(dataset, frame * std::ssize(mesh_.mesh.points), count);
   }
   std::vector<double> read_numbers(hid_t dataset, std::int64_t frame) const {
-    require(frame);
+    std::vector<double> numbers(points_of(frame));
     const hdf5::Quiet quiet;
-    std::vector<double> numbers(mesh_.mesh.points.size());
-    hdf5::read_rows(dataset, H5T_NATIVE_DOUBLE, static_cast<hsize_t>(frame) * numbers.size(),
-                    numbers.size(), numbers.data(), "a frame cannot be read");
+    hdf5::read_rows(dataset, H5T_NATIVE_DOUBLE,
+                    static_cast<hsize_t>(frame) * mesh_.mesh.points.size(), numbers.size(),
+                    numbers.data(), "a frame cannot be read");
     return numbers;
   }
 
@@ -160,6 +194,7 @@ struct ResultReader::File {
   std::vector<Handle> scalars_;  ///< of mesh_.scalars
   ResultMesh mesh_;
   std::vector<double> times_;
+  std::vector<std::size_t> counts_;  ///< points of the frames of a growing result
   std::int64_t capacity_ = 0;
 };
 
@@ -179,6 +214,10 @@ std::int64_t ResultReader::capacity() const { return file_->capacity_; }
 std::vector<double> const& ResultReader::times() const { return file_->times_; }
 ResultMesh const& ResultReader::mesh() const { return file_->mesh_; }
 bool ResultReader::has_velocities() const { return file_->velocity_ >= 0; }
+std::size_t ResultReader::particles(std::int64_t frame) const {
+  ResultMesh const& all = file_->mesh_;
+  return all.particles + file_->points_of(frame) - all.mesh.points.size();
+}
 
 std::vector<Point> ResultReader::positions(std::int64_t frame) const {
   return file_->read(file_->points_, frame);

@@ -19,6 +19,7 @@
 #include <taut/core/io/file.hpp>
 #include <taut/core/io/hdf5.hpp>
 #include <taut/core/io/vtkhdf.hpp>
+#include <taut/core/io/vtkhdf_layout.hpp>
 #include <taut/core/io/xdmf.hpp>
 
 namespace taut {
@@ -26,147 +27,27 @@ namespace {
 
 namespace fs = std::filesystem;
 using hdf5::Handle;
-using hdf5::Shape;
+using namespace vtkhdf;
 
-constexpr std::array tables{"/taut/steps_a", "/taut/steps_b"};
-constexpr std::uint8_t vtk_vertex = 1, vtk_triangle = 5, vtk_tetra = 10;
-
-template <class T, class Container>
-void write_list(hid_t parent, std::string const& name, Container const& values) {
-  hdf5::write_dataset<T>(parent, name, values, {values.size()});
-}
-
-void write_count(hid_t parent, std::string const& name, std::size_t count) {
-  write_list<std::int64_t>(parent, name, std::array{static_cast<std::int64_t>(count)});
-}
-
-/// Room for one vector, or one number, per point and frame; unwritten rows take no disk space.
-void reserve_frames(hid_t parent, std::string const& name, std::size_t points,
-                    std::int64_t capacity, bool vectors = true) {
-  Shape shape{static_cast<hsize_t>(capacity) * points};
-  if (vectors) shape.push_back(3);
-  hdf5::make_dataset(parent, name, H5T_NATIVE_DOUBLE, shape, true);
-}
-
-/// The times of the steps: as long as there are steps, at least 1, in one chunk that never moves.
-void make_times(hid_t table, std::int64_t capacity) {
-  const Handle list = hdf5::creation_list(H5P_DATASET_CREATE);
-  const auto most = static_cast<hsize_t>(capacity);
-  const hsize_t least = 1;
-  hdf5::check(H5Pset_chunk(list, 1, &most), "Values");
-  hdf5::check(H5Pset_alloc_time(list, H5D_ALLOC_TIME_EARLY), "Values");
-  const Handle space(H5Screate_simple(1, &least, &most), H5Sclose, "Values");
-  const Handle dataset(
-      H5Dcreate2(table, "Values", H5T_NATIVE_DOUBLE, space, H5P_DEFAULT, list, H5P_DEFAULT),
-      H5Dclose, "the dataset Values cannot be created");
-}
-
-/// The two step tables without steps. They share what depends on the step's number alone: the
-/// points of step k begin at row k N, its cells are always the first.
-void make_tables(hid_t file, ResultMesh const& mesh, std::int64_t capacity, bool velocities) {
-  const std::size_t points = mesh.mesh.points.size();
-  const auto n = static_cast<std::size_t>(capacity);
-  const std::vector<std::int64_t> zeros(n, 0);
-  std::vector<std::int64_t> rows(n);
-  for (std::size_t k = 0; k < n; ++k) rows[k] = static_cast<std::int64_t>(k * points);
-
-  const Handle first = hdf5::make_group(file, tables[0]);
-  write_list<std::int64_t>(first, "NumberOfParts", std::vector<std::int64_t>(n, 1));
-  write_list<std::int64_t>(first, "PartOffsets", zeros);
-  write_list<std::int64_t>(first, "PointOffsets", rows);
-  for (char const* const name : {"CellOffsets", "ConnectivityIdOffsets"}) {
-    hdf5::write_dataset<std::int64_t>(first, name, zeros, {n, 1});
-  }
-  const Handle point_data = hdf5::make_group(first, "PointDataOffsets");
-  if (velocities) write_list<std::int64_t>(point_data, "velocity", rows);
-  for (std::string const& name : mesh.scalars) write_list<std::int64_t>(point_data, name, rows);
-  const Handle cell_data = hdf5::make_group(first, "CellDataOffsets");
-  write_list<std::int64_t>(cell_data, "object", zeros);
-
-  const Handle second = hdf5::make_group(file, tables[1]);
-  for (char const* const name : {"NumberOfParts", "PartOffsets", "PointOffsets", "CellOffsets",
-                                 "ConnectivityIdOffsets", "PointDataOffsets", "CellDataOffsets"}) {
-    hdf5::check(H5Lcreate_hard(first, name, second, name, H5P_DEFAULT, H5P_DEFAULT), name);
-  }
-  const std::int64_t no_steps = 0;
-  for (hid_t const table : {hid_t(first), hid_t(second)}) {
-    make_times(table, capacity);
-    hdf5::write_attribute(table, "NSteps", H5T_NATIVE_INT64, {}, &no_steps);
-  }
-}
-
-void write_cells(hid_t grid, ResultMesh const& mesh) {
-  const std::size_t solids = mesh.particles + mesh.mesh.tets.size(),
-                    cells = solids + mesh.triangles.size();
-  std::vector<std::int64_t> ids, offsets{0};
-  ids.reserve(mesh.particles + 4 * mesh.mesh.tets.size() + 3 * mesh.triangles.size());
-  offsets.reserve(cells + 1);
-  const auto add = [&](auto const& cell) {
-    ids.insert(ids.end(), cell.begin(), cell.end());
-    offsets.push_back(static_cast<std::int64_t>(ids.size()));
+/// Two growing meshes: whether one has all that the other has, and particles behind it.
+bool same_but_for_growth(ResultMesh const& a, ResultMesh const& b) {
+  const std::size_t both = std::min(a.particles, b.particles);
+  const auto shift_of = [&](ResultMesh const& mesh) {
+    return static_cast<std::int32_t>(mesh.particles);
   };
-  for (std::size_t p = 0; p < mesh.particles; ++p) {
-    add(std::array{static_cast<std::int64_t>(p)});
+  if (a.triangles.size() != b.triangles.size() ||
+      a.mesh.points.size() - a.particles != b.mesh.points.size() - b.particles ||
+      !std::equal(a.object.begin(), a.object.begin() + static_cast<std::ptrdiff_t>(both),
+                  b.object.begin())) {
+    return false;
   }
-  for (Tet const& tet : mesh.mesh.tets) add(tet);
-  for (Triangle const& triangle : mesh.triangles) add(triangle);
-  write_count(grid, "NumberOfCells", cells);
-  write_count(grid, "NumberOfConnectivityIds", ids.size());
-  write_list<std::int64_t>(grid, "Connectivity", ids);
-  write_list<std::int64_t>(grid, "Offsets", offsets);
-  std::vector<std::uint8_t> types(mesh.particles, vtk_vertex);
-  types.resize(solids, vtk_tetra);
-  types.resize(cells, vtk_triangle);
-  write_list<std::uint8_t>(grid, "Types", types);
-}
-
-/// One per object.
-std::vector<ObjectKind> kinds_of(ResultMesh const& mesh) {
-  std::vector<ObjectKind> kinds;
-  for (std::size_t i = 0; i < mesh.object_names.size(); ++i) kinds.push_back(mesh.kind(i));
-  return kinds;
-}
-
-/// Writes a result without frames; `path` is valid only once this has returned.
-void lay_out(fs::path const& path, ResultMesh const& mesh, std::int64_t capacity, bool velocities) {
-  const std::size_t points = mesh.mesh.points.size();
-  Handle file = hdf5::create_file(path);
-  // First of all, so that its header lies in the file's first page.
-  Handle grid = hdf5::make_group(file, "VTKHDF");
-  constexpr std::array<std::int64_t, 2> version{2, 0};
-  constexpr std::string_view type = "UnstructuredGrid";
-  hdf5::write_attribute(grid, "Version", H5T_NATIVE_INT64, {version.size()}, version.data());
-  {
-    const Handle text(H5Tcopy(H5T_C_S1), H5Tclose, "Type");
-    hdf5::check(H5Tset_size(text, type.size()), "Type");
-    hdf5::check(H5Tset_strpad(text, H5T_STR_NULLPAD), "Type");
-    hdf5::write_attribute(grid, "Type", text, {}, type.data());
+  for (std::size_t t = 0; t < a.triangles.size(); ++t) {
+    if (a.object[a.particles + t] != b.object[b.particles + t]) return false;
+    for (std::size_t c = 0; c < 3; ++c) {
+      if (a.triangles[t][c] - shift_of(a) != b.triangles[t][c] - shift_of(b)) return false;
+    }
   }
-  write_count(grid, "NumberOfPoints", points);
-  write_cells(grid, mesh);
-  const Handle cell_data = hdf5::make_group(grid, "CellData");
-  write_list<std::int32_t>(cell_data, "object", mesh.object);
-
-  const Handle ours = hdf5::make_group(file, "taut");
-  hdf5::write_strings(ours, "object_names", mesh.object_names);
-  std::vector<std::uint8_t> kinds;
-  for (ObjectKind const kind : kinds_of(mesh)) kinds.push_back(static_cast<std::uint8_t>(kind));
-  write_list<std::uint8_t>(ours, "object_kind", kinds);
-  {
-    const Handle start = hdf5::make_dataset(ours, "points", H5T_NATIVE_DOUBLE, {points, 3});
-    hdf5::write_rows(start, H5T_NATIVE_DOUBLE, 0, points, mesh.mesh.points.data(), "points");
-  }
-  if (!mesh.scalars.empty()) hdf5::write_strings(ours, "scalars", mesh.scalars);
-  make_tables(file, mesh, capacity, velocities);
-  hdf5::check(H5Lcreate_soft(tables[0], grid, "Steps", H5P_DEFAULT, H5P_DEFAULT), "Steps");
-
-  reserve_frames(grid, "Points", points, capacity);
-  const Handle point_data = hdf5::make_group(grid, "PointData");
-  if (velocities) reserve_frames(point_data, "velocity", points, capacity);
-  for (std::string const& name : mesh.scalars) {
-    reserve_frames(point_data, name, points, capacity, false);
-  }
-  hdf5::check(H5Fflush(file, H5F_SCOPE_LOCAL), "the layout cannot be written");
+  return true;
 }
 
 /// Throws Error when the disk cannot hold what lay_out() writes at once. HDF5 cannot close a file
@@ -219,15 +100,11 @@ struct ResultWriter::File {
     {
       // Closed before the file is opened for writing: HDF5 refuses both in one process.
       ResultReader const reader(path_);
-      ResultMesh const& all = reader.mesh();
-      shape_ = {all.mesh.points.size(),
-                all.particles,
-                all.mesh.tets.size(),
-                all.triangles.size(),
-                reader.capacity(),
-                reader.has_velocities(),
-                all.scalars};
+      shape_ = shape_of(reader.mesh(), reader.capacity(), reader.has_velocities());
       times_ = reader.times();
+      counts_.clear();
+      for (std::int64_t k = 0; k < reader.frames(); ++k) counts_.push_back(reader.particles(k));
+      if (shape_.growing) mesh_ = reader.mesh();
     }
     const hdf5::Quiet quiet;
     file_ = hdf5::open_file(path_, H5F_ACC_RDWR);
@@ -266,26 +143,54 @@ struct ResultWriter::File {
 
   void write_frame(double time, std::span<Point const> positions, std::span<Point const> velocities,
                    std::span<std::vector<double> const> scalars) {
-    const hsize_t row = times_.size() * shape_.points;
-    hdf5::write_rows(points_, H5T_NATIVE_DOUBLE, row, shape_.points, positions.data(),
+    const hsize_t row = times_.size() * shape_.points, rows = positions.size();
+    hdf5::write_rows(points_, H5T_NATIVE_DOUBLE, row, rows, positions.data(),
                      "the positions cannot be written");
     if (shape_.velocities) {
-      hdf5::write_rows(velocity_, H5T_NATIVE_DOUBLE, row, shape_.points, velocities.data(),
+      hdf5::write_rows(velocity_, H5T_NATIVE_DOUBLE, row, rows, velocities.data(),
                        "the velocities cannot be written");
     }
     for (std::size_t k = 0; k < scalars_.size(); ++k) {
-      hdf5::write_rows(scalars_[k], H5T_NATIVE_DOUBLE, row, shape_.points, scalars[k].data(),
+      hdf5::write_rows(scalars_[k], H5T_NATIVE_DOUBLE, row, rows, scalars[k].data(),
                        "the numbers of a frame cannot be written");
     }
+    const std::size_t particles = rows + shape_.particles - shape_.points;
+    if (shape_.growing) write_cells_of_frame(particles);
     times_.push_back(time);
+    counts_.push_back(particles);
     commit();
   }
 
-  /// Moves the result into a file laid out for more frames.
-  void grow(std::int64_t capacity) {
+  /// Of the frame behind the last one.
+  void write_cells_of_frame(std::size_t particles) {
+    const Cells cells(mesh_, particles);
+    const hsize_t frame = times_.size();
+    const auto write = [&](std::string const& name, auto const& list, hsize_t first) {
+      using T = typename std::decay_t<decltype(list)>::value_type;
+      hdf5::write_rows(hdf5::open_dataset(grid_, name), hdf5::memory_type<T>(), first, list.size(),
+                       list.data(), "the cells of a frame cannot be written");
+    };
+    const auto count = [&](std::string const& name, std::size_t number) {
+      write(name, std::vector<std::int64_t>{static_cast<std::int64_t>(number)}, frame);
+    };
+    write("Connectivity", cells.ids, frame * shape_.corners());
+    write("Offsets", cells.offsets, frame * (shape_.cells() + 1));
+    write("Types", cells.types, frame * shape_.cells());
+    std::vector<std::int32_t> object(mesh_.object.begin(),
+                                     mesh_.object.begin() + static_cast<std::ptrdiff_t>(particles));
+    object.insert(object.end(), mesh_.object.begin() + static_cast<std::ptrdiff_t>(mesh_.particles),
+                  mesh_.object.end());
+    write("CellData/object", object, frame * shape_.cells());
+    count("NumberOfPoints", shape_.points - shape_.particles + particles);
+    count("NumberOfCells", cells.types.size());
+    count("NumberOfConnectivityIds", cells.ids.size());
+  }
+
+  /// Moves the result into a file laid out for more frames, or of another growing mesh.
+  void grow(std::int64_t capacity, ResultMesh const* mesh = nullptr) {
     replace_file(path_, [&](fs::path const& larger) {
       ResultReader const reader(path_);
-      lay_out(larger, reader.mesh(), capacity, shape_.velocities);
+      lay_out(larger, mesh ? *mesh : reader.mesh(), capacity, shape_.velocities);
       File copy(larger);
       for (std::int64_t k = 0; k < std::ssize(times_); ++k) {
         const std::vector<Point> velocities =
@@ -304,6 +209,8 @@ struct ResultWriter::File {
   fs::path path_;
   ResultShape shape_;
   std::vector<double> times_;
+  std::vector<std::size_t> counts_;  // particles of the frames
+  ResultMesh mesh_;                  // of a growing result
   Handle file_;
   Handle grid_;
   Handle points_;
@@ -334,6 +241,10 @@ ResultWriter ResultWriter::create(fs::path const& path, ResultMesh const& mesh,
         path.string(), mesh.particles, mesh.mesh.tets.size(), mesh.triangles.size(),
         mesh.object.size());
   }
+  if (mesh.growing && (mesh.particles == 0 || !mesh.mesh.tets.empty())) {
+    throw Error("{}: a result of {} particles and {} tets cannot grow: it has particles alone.",
+                path.string(), mesh.particles, mesh.mesh.tets.size());
+  }
   if (mesh.particles > mesh.mesh.points.size()) {
     throw Error("{}: {} particles are more than the {} points.", path.string(), mesh.particles,
                 mesh.mesh.points.size());
@@ -359,9 +270,12 @@ ResultWriter ResultWriter::resume(fs::path const& path, ResultMesh const& mesh, 
   {
     ResultReader const reader(path);
     ResultMesh const& old = reader.mesh();
-    if (old.mesh.points.size() != mesh.mesh.points.size() || old.mesh.tets != mesh.mesh.tets ||
-        old.triangles != mesh.triangles || old.object != mesh.object ||
-        old.particles != mesh.particles || old.scalars != mesh.scalars ||
+    const bool same = mesh.growing && old.growing
+                          ? same_but_for_growth(old, mesh)
+                          : old.mesh.points.size() == mesh.mesh.points.size() &&
+                                old.triangles == mesh.triangles && old.object == mesh.object &&
+                                old.particles == mesh.particles && old.growing == mesh.growing;
+    if (!same || old.mesh.tets != mesh.mesh.tets || old.scalars != mesh.scalars ||
         old.object_names != mesh.object_names || old.object_kind != kinds_of(mesh)) {
       throw Error(
           "{}: this result is of another mesh or other objects; restart with the scene it "
@@ -377,6 +291,7 @@ ResultWriter ResultWriter::resume(fs::path const& path, ResultMesh const& mesh, 
   }
   name_errors(path, "the result cannot be continued", [&] {
     file->times_.resize(static_cast<std::size_t>(frames));
+    file->counts_.resize(file->times_.size());
     const std::int64_t room = std::max(capacity, file->shape_.capacity);
     bool whole = true;
     try {
@@ -386,9 +301,10 @@ ResultWriter ResultWriter::resume(fs::path const& path, ResultMesh const& mesh, 
       // the frames are moved into a new file.
       whole = false;
     }
-    if (!whole || room > file->shape_.capacity) file->grow(room);
+    const bool more = mesh.growing && mesh.particles > file->shape_.particles;
+    if (!whole || more || room > file->shape_.capacity) file->grow(room, more ? &mesh : nullptr);
   });
-  file->sidecar_.restart(file->times_);
+  file->sidecar_.restart(file->times_, file->counts_);
   return ResultWriter(std::move(file));
 }
 
@@ -396,18 +312,21 @@ void ResultWriter::append(double time, std::span<Point const> positions,
                           std::span<Point const> velocities,
                           std::span<std::vector<double> const> scalars) {
   ResultShape const& shape = file_->shape_;
-  const std::size_t expected = shape.velocities ? shape.points : 0;
-  if (positions.size() != shape.points || velocities.size() != expected) {
+  const std::size_t rows = positions.size(), least = shape.points - shape.particles;
+  const std::size_t expected = shape.velocities ? rows : 0;
+  if (!(shape.growing ? rows >= least && rows <= shape.points : rows == shape.points) ||
+      velocities.size() != expected) {
     throw Error(
         "{}: a frame of {} positions and {} velocities does not fit this result of {} and "
         "{}.",
-        file_->path_.string(), positions.size(), velocities.size(), shape.points, expected);
+        file_->path_.string(), rows, velocities.size(), shape.points,
+        shape.velocities ? shape.points : 0);
   }
   bool fits = scalars.size() == shape.scalars.size();
-  for (std::vector<double> const& list : scalars) fits = fits && list.size() == shape.points;
+  for (std::vector<double> const& list : scalars) fits = fits && list.size() == rows;
   if (!fits) {
     throw Error("{}: a frame with {} lists of numbers does not fit this result of {}, of {} each.",
-                file_->path_.string(), scalars.size(), shape.scalars.size(), shape.points);
+                file_->path_.string(), scalars.size(), shape.scalars.size(), rows);
   }
   const bool grows = frames() == shape.capacity;
   name_errors(file_->path_, fmt::format("frame {} cannot be written", frames()), [&] {
@@ -417,13 +336,14 @@ void ResultWriter::append(double time, std::span<Point const> positions,
       file_->write_frame(time, positions, velocities, scalars);
     } catch (Error const&) {
       file_->times_.resize(before);
+      file_->counts_.resize(before);
       throw;
     }
   });
   if (grows) {
-    file_->sidecar_.restart(file_->times_);
+    file_->sidecar_.restart(file_->times_, file_->counts_);
   } else {
-    file_->sidecar_.append(time);
+    file_->sidecar_.append(time, file_->counts_.back());
   }
 }
 

@@ -20,6 +20,11 @@ struct ResultShape {
   std::int64_t capacity = 0;  ///< frames the datasets have room for
   bool velocities = true;
   std::vector<std::string> scalars = {};  ///< names of the numbers that points have
+  bool growing = false;                   ///< each frame has the first of the particles alone
+
+  std::size_t cells() const { return particles + tets + triangles; }
+  /// Numbers of points that cells name.
+  std::size_t corners() const { return particles + 4 * tets + 3 * triangles; }
 };
 
 class XdmfSidecar {
@@ -27,14 +32,15 @@ public:
   /// For the result at `path`; the sidecar lies beside it as <stem>.xdmf. Nothing is written yet.
   XdmfSidecar(std::filesystem::path const& path, ResultShape const& shape);
 
-  /// Starts over with these frames, and writes the sidecar.
-  void restart(std::span<double const> times);
+  /// Starts over with these frames, and writes the sidecar. `particles`: in each of them; all if
+  /// there is no list.
+  void restart(std::span<double const> times, std::span<std::size_t const> particles = {});
   /// Adds the next frame, over the closing tags. Throws Error if it cannot be written.
-  void append(double time);
+  void append(double time, std::size_t particles);
 
 private:
   /// The XML of frame number `frame`.
-  std::string grid(std::int64_t frame, double time) const;
+  std::string grid(std::int64_t frame, double time, std::size_t particles) const;
 
   std::filesystem::path path_;
   std::string result_;  // file name of the result, seen from the sidecar

@@ -270,9 +270,22 @@ TEST_CASE("mistakes in a scene of material points are answered by a sentence", "
   refused("shape = { kind = \"box\", size = [0.4, 0.4, 0.4] }", "mesh = \"there_is_none.obj\"",
           "there_is_none.obj");
   refused("name = \"floor\"", "name = \"cube\"", "the name 'cube' is taken");
+  refused("translate = [0, 0.2, 0]", "translate = [0, 1e9, 0]", "object cube reaches 1e+09 m");
+  refused("spacing = 0.1", "spacing = 2e-5", "GB are free: raise grid.spacing");
+  refused("frames = 2", "frames = 2\n[output]\nobj = true", "output.obj writes surfaces");
+  refused("spacing = 0.1", "spacing = 0.1\nkernel = \"cubi\"", "grid.kernel is 'cubi'");
+  refused("spacing = 0.1", "spacing = 0.1\ntransfer = \"pic\"", "grid.transfer is 'pic'");
+  refused("gravity = [0, -10, 0]", "gravity = [0, -10, 0]\n[solver]\nmethod = \"magic\"",
+          "solver.method is 'magic'");
   SceneRun const meshes("plain.toml", plain_scene + "\n[[boundary]]\nname = \"a\"\n");
   CHECK_THROWS_MATCHES(run_command(meshes.options), Error,
                        MessageMatches(ContainsSubstring("make it an [[obstacle]]")));
+  SceneRun const source("plain.toml", plain_scene + "\n[[source]]\nname = \"a\"\n");
+  CHECK_THROWS_MATCHES(run_command(source.options), Error,
+                       MessageMatches(ContainsSubstring("lets out material points")));
+  SceneRun const grid("plain.toml", plain_scene, {"output.vdb=true"});
+  CHECK_THROWS_MATCHES(run_command(grid.options), Error,
+                       MessageMatches(ContainsSubstring("output.vdb writes the grid")));
   SceneRun const metric("plain.toml", plain_scene, {"solver.preconditioner=multigrid"});
   CHECK_THROWS_MATCHES(run_command(metric.options), Error,
                        MessageMatches(ContainsSubstring("needs the nodes of a grid")));

@@ -466,3 +466,67 @@ TEST_CASE("a result of particles carries numbers, and triangles behind them", "[
       ResultWriter::create(folder / "other.vtkhdf", mesh, 2, ResultWriter::IfExists::refuse),
       Error);
 }
+
+TEST_CASE("a result of particles grows, and triangles stay behind them", "[io][result]") {
+  const Folder folder;
+  const auto path = folder / "result.vtkhdf";
+  const auto mesh_of = [](std::size_t particles) {
+    ResultMesh mesh;
+    for (std::size_t p = 0; p < particles + 3; ++p) mesh.mesh.points.push_back({double(p), 0, 1});
+    mesh.object.assign(particles, 1);
+    mesh.object[0] = 0;
+    mesh.object.push_back(2);
+    mesh.object_names = {"stone", "source", "wall"};
+    mesh.object_kind = {ObjectKind::body, ObjectKind::body, ObjectKind::obstacle};
+    const auto first = static_cast<std::int32_t>(particles);
+    mesh.triangles = {{first, first + 1, first + 2}};
+    mesh.particles = particles;
+    mesh.scalars = {"J"};
+    mesh.growing = true;
+    return mesh;
+  };
+  /// Places of frame k, which has 1 + 2 k particles.
+  const auto places = [](int k) {
+    std::vector<Point> list;
+    for (int p = 0; p < 1 + 2 * k; ++p) list.push_back({double(p), 0.5 * k, -1});
+    for (int v = 0; v < 3; ++v) list.push_back({double(v), -7, double(k)});
+    return list;
+  };
+  const auto numbers = [&](int k) {
+    std::vector<double> list;
+    for (Point const& x : places(k)) list.push_back(10 * x[0] + k);
+    return std::vector<std::vector<double>>{list};
+  };
+  {
+    auto writer = ResultWriter::create(path, mesh_of(5), 2, ResultWriter::IfExists::refuse);
+    for (int k = 0; k < 3; ++k) writer.append(k, places(k), places(k), numbers(k));
+    CHECK_THROWS_AS(writer.append(3, places(3), places(3), numbers(3)), Error);  // more than 5
+    CHECK_THROWS_AS(writer.append(3, {}, {}, {}), Error);                        // no wall
+    CHECK_THROWS_AS(writer.append(3, places(2), places(1), numbers(2)), Error);
+  }
+  {  // prolonged, with more to come out; and with less, as if it were to end sooner
+    auto writer = ResultWriter::resume(path, mesh_of(9), 2, 6);
+    for (int k = 2; k < 5; ++k) writer.append(k, places(k), places(k), numbers(k));
+    ResultWriter::resume(path, mesh_of(3), 5, 6);
+    ResultMesh other = mesh_of(9);
+    other.object[3] = 0;
+    CHECK_THROWS_AS(ResultWriter::resume(path, other, 2, 6), Error);
+    other = mesh_of(9);
+    other.growing = false;
+    CHECK_THROWS_AS(ResultWriter::resume(path, other, 2, 6), Error);
+  }
+  const ResultReader reader(path);
+  check_same(reader.mesh(), mesh_of(9));
+  CHECK(reader.mesh().growing);
+  REQUIRE(reader.frames() == 5);
+  for (int k = 0; k < 5; ++k) {
+    CHECK(reader.particles(k) == std::size_t(1 + 2 * k));
+    CHECK(reader.positions(k) == places(k));
+    CHECK(reader.velocities(k) == places(k));
+    CHECK(reader.scalar("J", k) == numbers(k)[0]);
+  }
+  CHECK_THROWS_AS(reader.particles(5), Error);
+  std::string const sidecar = read_file(folder / "result.xdmf");
+  CHECK(sidecar.find("NumberOfElements=\"9\"") != std::string::npos);
+  CHECK(sidecar.find("NumberOfElements=\"7\"") != std::string::npos);
+}
