@@ -164,11 +164,15 @@ private:
     return ParticlePotential(unknowns, Inertia<P>(unknowns),
                              BodyForce<P>(unknowns, {g[0], g[1], g[2]}), terms, Slip<P>());
   }
-  /// Friction takes its forces from the minimisation before.
+  /// Friction takes its forces from the minimisation before, and what separates is held or let go
+  /// between minimisations: as often as something changes, which is rarely more than twice.
   Lagging lagging() const {
-    bool const friction = std::any_of(points_.boundaries.begin(), points_.boundaries.end(),
-                                      [](SceneBoundary const& b) { return b.friction > 0; });
-    return {friction ? 2 : 1};
+    int passes = 1;
+    for (SceneBoundary const& b : points_.boundaries) {
+      if (b.friction > 0) passes = std::max(passes, 2);
+      if (b.law == BoundaryLaw::separate) passes = 8;
+    }
+    return {passes};
   }
 
   /// One step towards the end of the frame. The last two steps share what is left, so that none is
