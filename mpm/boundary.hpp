@@ -235,7 +235,7 @@ private:
     Values values("boundary_field", field.values.size());
     Kokkos::View<float const*, Kokkos::HostSpace> const host(field.values.data(),
                                                              field.values.size());
-    Kokkos::deep_copy(values, host);
+    assign(values, host);
     return values;
   }
   static FieldView view_of(DistanceField const& field, Values const& values) {

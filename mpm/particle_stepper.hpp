@@ -104,8 +104,8 @@ public:
       boundaries.set_time(time + h);
       grid.fix(boundaries, h);
       scene.for_each_term([&](auto& term) {
-        if constexpr (requires { term.hold(grid.rest(), boundaries, h); }) {
-          term.hold(grid.rest(), boundaries, h);
+        if constexpr (requires { term.hold(grid.rest(), grid.unknowns(), boundaries, h); }) {
+          term.hold(grid.rest(), grid.unknowns(), boundaries, h);
         }
       });
       start(grid);

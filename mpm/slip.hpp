@@ -1,270 +1,51 @@
-// Boundaries along which nodes slide: a term that is steep across them and flat along them,
+// Boundaries along which nodes slide: a term that holds them across and lets them go along,
 //
-//   V(x) = Sum_i Sum_k  1/2 s_i (n_ik . d_ik)^2,      d_ik = x_i - (X_i + h v_k(X_i)),
+//   V(x) = Sum_i Sum_k  -f_ik (n_ik . d_ik) + 1/2 s_i (n_ik . d_ik)^2,
+//   d_ik = x_i - (X_i + h v_k(X_i)),
 //
-// over the boundaries k that hold node i, with n_ik the normal that leads out of the solid; where
-// contact may separate, only while n . d < 0. Any number of normals may meet at a node: their
-// constraints hold together, in corners too, without a basis in which they would be orthogonal.
-// s_i is `steepness` times what else resists a motion of the node, so that it gives way by that
-// share of what the constraint takes from its motion, whatever the material and the step. A block
-// preconditioner takes all of it.
+// over the boundaries k that hold node i, with n_ik the normal that leads out of the solid. Any
+// number of normals may meet at a node: their constraints hold together, in corners too, without a
+// basis in which they would be orthogonal. s_i is `steepness` times what else resists a motion of
+// the node, and f_ik is the force that it would take for the node to go with the boundary if what
+// is elastic stayed as it was at the start (an augmented Lagrangian, Hestenes 1969): a body at rest
+// does not sink at all, and an impact gives way by the share 1 / steepness of the motion that it
+// takes, whatever the material and the step. A block preconditioner takes all of V.
 //
-// Friction is Coulomb's, smoothed, with the normal force of the last minimisation (Lagging passes):
-// along the boundary
+// Where contact may separate, a node is held, both ways, or free, for a whole minimisation, so that
+// each is as smooth as one of a body that slips. Held is first what has a positive f; then what
+// pulls is let go and what has entered the solid is held, and the step is minimised again (Lagging
+// passes), until that changes nothing: the primal-dual active set method (Hintermueller, Ito,
+// Kunisch 2003), with f the force where the last minimisation ended. A one-sided V, in comparison,
+// has a kink in its slope at which quasi-Newton methods and line searches get stuck (measured: 398
+// iterations where 12 do).
+//
+// Friction is Coulomb's, smoothed: along the boundary
 //
 //   D(x) = Sum mu f_ik g(|u_ik|),     u = (I - n n^T) d,   g' = y/e (2 - y/e) for y < e, then 1
 //
-// with f the force s |n . d| and e = stick_speed h (Li et al. 2020, section 5, for its smoothing).
+// with e = stick_speed h (Li et al. 2020, section 5, for its smoothing), and with f that of the
+// last minimisation.
 #pragma once
 
 #include <taut/core/exec/copy.hpp>
-#include <taut/core/exec/parallel.hpp>
 #include <taut/core/exec/scan.hpp>
-#include <taut/core/potential/term.hpp>
-#include <taut/mpm/boundary.hpp>
+#include <taut/core/potential/unknowns.hpp>
+#include <taut/mpm/slip_kernels.hpp>
 
 namespace taut {
 
 struct SlipParams {
   double steepness = 1e3;     ///< over what else resists; 10 to 1e4
   double stick_speed = 1e-3;  ///< m/s, below which friction sticks
+  /// What is held or free by mistake is left so if that costs less energy than all of the mass over
+  /// this length, in cells, in a step.
+  double settled = 3e-4;
+  double friction_change = 1e-2;  ///< of all friction forces, rms, that is left as it is
 };
-
-namespace kernels {
-
-/// One node in one boundary.
-struct SlipPair {
-  int boundary = 0;
-  Vec3<double> normal{}, target{};  ///< where the node would be if it went with the boundary, m
-  double friction_force = 0;        ///< mu f of the last minimisation, N
-  bool separates = false;
-};
-
-template <class S>
-struct SlipViews {
-  Kokkos::View<int*, typename S::memory> begin;  ///< per node, +1
-  Kokkos::View<SlipPair*, typename S::memory> pair;
-  Kokkos::View<double*, typename S::memory> stiffness;  ///< per node, N/m
-  double stick = 1;                                     ///< e, m
-  bool friction = false;
-};
-
-KOKKOS_FORCEINLINE_FUNCTION bool slides(Boundary const& b) {
-  return b.contact != BoundaryContact::sticky;
-}
-
-template <class S, class Positions>
-struct CountSlip {
-  Kokkos::View<Boundary const*, typename S::memory> boundaries;
-  int count;
-  Positions rest;
-  KOKKOS_FUNCTION int operator()(int n) const {
-    Vec3<double> const x{double(rest(n, 0)), double(rest(n, 1)), double(rest(n, 2))};
-    int held = 0;
-    for (int k = 0; k < count; ++k) held += slides(boundaries(k)) && boundaries(k).holds(x);
-    return held;
-  }
-};
-
-template <class S, class Positions>
-struct ListSlip {
-  CountSlip<S, Positions> of;
-  double h;
-  SlipViews<S> to;
-  KOKKOS_FUNCTION void operator()(int n) const {
-    Vec3<double> const x{double(of.rest(n, 0)), double(of.rest(n, 1)), double(of.rest(n, 2))};
-    int at = to.begin(n);
-    for (int k = 0; k < of.count; ++k) {
-      Boundary const& b = of.boundaries(k);
-      SlipPair pair;
-      if (!slides(b) || b.distance(x, pair.normal) > 0) continue;
-      pair.boundary = k;
-      pair.target = x + h * b.velocity_at(x);
-      pair.separates = b.contact == BoundaryContact::separate;
-      to.pair(at++) = pair;
-    }
-  }
-};
-
-template <class S, class Real>
-struct SlipStiffness {
-  Array<Real, S> resists;
-  double steepness;
-  Kokkos::View<double*, typename S::memory> stiffness;
-  KOKKOS_FUNCTION void operator()(int n) const { stiffness(n) = steepness * double(resists(n)); }
-};
-
-/// The energy (J) of one node in its boundaries, and its derivatives.
-template <class S>
-struct SlipEnergy {
-  SlipViews<S> views;
-
-  /// g(y) / e and g'(y) / y times e, both smooth at 0.
-  KOKKOS_FUNCTION static double smooth(double y) {
-    return y < 1 ? y * y * (1 - y / 3) : y - 1.0 / 3;
-  }
-  KOKKOS_FUNCTION static double slope_over(double y) { return y < 1 ? 2 - y : 1 / y; }
-
-  KOKKOS_FUNCTION Vec3<double> along(SlipPair const& p, Vec3<double> const& d) const {
-    return (1 / views.stick) * (d - dot(p.normal, d) * p.normal);
-  }
-  KOKKOS_FUNCTION bool touches(SlipPair const& p, double depth) const {
-    return !p.separates || depth < 0;
-  }
-  /// V(x + s) - V(x)
-  KOKKOS_FUNCTION double change(int n, Vec3<double> const& x, Vec3<double> const& s) const {
-    double sum = 0;
-    for (int k = views.begin(n); k < views.begin(n + 1); ++k) {
-      SlipPair const& p = views.pair(k);
-      Vec3<double> const d = x - p.target;
-      double before = dot(p.normal, d), step = dot(p.normal, s);
-      if (p.separates) {
-        double const after = Kokkos::min(before + step, 0.0);
-        before = Kokkos::min(before, 0.0);
-        step = after - before;
-      }
-      sum += views.stiffness(n) * step * (before + 0.5 * step);
-      if (p.friction_force > 0) {
-        double const from = norm(along(p, d)), to = norm(along(p, d + s));
-        sum += p.friction_force * views.stick * (smooth(to) - smooth(from));
-      }
-    }
-    return sum;
-  }
-  KOKKOS_FUNCTION double value(int n, Vec3<double> const& x) const {
-    double sum = 0;
-    for (int k = views.begin(n); k < views.begin(n + 1); ++k) {
-      SlipPair const& p = views.pair(k);
-      Vec3<double> const d = x - p.target;
-      double const depth = dot(p.normal, d);
-      if (touches(p, depth)) sum += 0.5 * views.stiffness(n) * depth * depth;
-      if (p.friction_force > 0) sum += p.friction_force * views.stick * smooth(norm(along(p, d)));
-    }
-    return sum;
-  }
-  KOKKOS_FUNCTION Vec3<double> gradient(int n, Vec3<double> const& x) const {
-    Vec3<double> sum{};
-    for (int k = views.begin(n); k < views.begin(n + 1); ++k) {
-      SlipPair const& p = views.pair(k);
-      Vec3<double> const d = x - p.target;
-      double const depth = dot(p.normal, d);
-      if (touches(p, depth)) sum = sum + (views.stiffness(n) * depth) * p.normal;
-      if (p.friction_force > 0) {
-        Vec3<double> const u = along(p, d);
-        sum = sum + (p.friction_force * slope_over(norm(u))) * u;
-      }
-    }
-    return sum;
-  }
-  /// Positive semi-definite: of friction, that of a spring with the same force.
-  KOKKOS_FUNCTION Sym3<double> curvature(int n, Vec3<double> const& x) const {
-    Sym3<double> sum{};
-    for (int k = views.begin(n); k < views.begin(n + 1); ++k) {
-      SlipPair const& p = views.pair(k);
-      Vec3<double> const d = x - p.target, &m = p.normal;
-      double across = touches(p, dot(m, d)) ? views.stiffness(n) : 0, isotropic = 0;
-      if (p.friction_force > 0) {
-        isotropic = p.friction_force * slope_over(norm(along(p, d))) / views.stick;
-        across -= isotropic;
-      }
-      constexpr int row[6] = {0, 1, 2, 0, 1, 0}, col[6] = {0, 1, 2, 1, 2, 2};
-      for (int c = 0; c < 6; ++c) {
-        sum.s[c] += across * m[row[c]] * m[col[c]] + (c < 3 ? isotropic : 0);
-      }
-    }
-    return sum;
-  }
-};
-
-template <class Field>
-KOKKOS_FORCEINLINE_FUNCTION Vec3<double> vector_at(Field const& f, int n) {
-  return {double(f(n, 0)), double(f(n, 1)), double(f(n, 2))};
-}
-
-template <class S, class Precision>
-struct SlipSum {
-  using Sum = Sums<typename Precision::sum, 1>;
-  SlipEnergy<S> energy;
-  VectorField<typename Precision::position, S> x;
-  VectorField<typename Precision::real, S> p;
-  int what;  ///< 0: value; 1: change by alpha p; 2: p' H p
-  double alpha;
-  KOKKOS_FUNCTION void operator()(int n, Sum& sum) const {
-    if (energy.views.begin(n) == energy.views.begin(n + 1)) return;
-    Vec3<double> const at = vector_at(x, n);
-    double here;
-    if (what == 0) {
-      here = energy.value(n, at);
-    } else if (what == 1) {
-      here = energy.change(n, at, alpha * vector_at(p, n));
-    } else {
-      here = quadratic(energy.curvature(n, at), vector_at(p, n));
-    }
-    sum[0] += static_cast<typename Precision::sum>(here);
-  }
-};
-
-template <class S, class Precision>
-struct AddSlip {
-  using Real = typename Precision::real;
-  SlipEnergy<S> energy;
-  VectorField<typename Precision::position, S> x;
-  double scale;
-  FixedMask<S> fixed;
-  VectorField<Real, S> g, p;  ///< p: of a product; empty: the gradient
-  VectorField<Real, S> diagonal;
-  BlockField<Real, S> blocks;
-  KOKKOS_FUNCTION void operator()(int n) const {
-    if (fixed(n) || energy.views.begin(n) == energy.views.begin(n + 1)) return;
-    Vec3<double> const at = vector_at(x, n);
-    Vec3<double> const add =
-        p.extent(0) > 0 ? energy.curvature(n, at) * vector_at(p, n) : energy.gradient(n, at);
-    for (int c = 0; c < 3; ++c) g(n, c) += static_cast<Real>(scale * add[c]);
-    if (diagonal.extent(0) == 0 && blocks.extent(0) == 0) return;
-    Sym3<double> const h = energy.curvature(n, at);
-    if (blocks.extent(0) > 0) {
-      for (int c = 0; c < 6; ++c) blocks(n, c) += static_cast<Real>(scale * h.s[c]);
-    } else {
-      for (int c = 0; c < 3; ++c) diagonal(n, c) += static_cast<Real>(scale * h.s[c]);
-    }
-  }
-};
-
-template <class S, class Precision, class Matrix>
-struct AssembleSlip {
-  SlipEnergy<S> energy;
-  VectorField<typename Precision::position, S> x;
-  double scale;
-  FixedMask<S> fixed;
-  Matrix matrix;
-  KOKKOS_FUNCTION void operator()(int n) const {
-    if (fixed(n) || energy.views.begin(n) == energy.views.begin(n + 1)) return;
-    matrix.add(n, n, scale * to_matrix(energy.curvature(n, vector_at(x, n))));
-  }
-};
-
-/// Takes the friction forces from where a minimisation ended; tells by how much they have changed.
-template <class S, class Precision>
-struct Relag {
-  SlipViews<S> views;
-  Kokkos::View<Boundary const*, typename S::memory> boundaries;
-  VectorField<typename Precision::position, S> x;
-  KOKKOS_FUNCTION void operator()(int n, double& most) const {
-    for (int k = views.begin(n); k < views.begin(n + 1); ++k) {
-      SlipPair& p = views.pair(k);
-      double const depth = dot(p.normal, vector_at(x, n) - p.target);
-      double const force =
-          boundaries(p.boundary).friction * Kokkos::max(0.0, -views.stiffness(n) * depth);
-      most = Kokkos::max(most, Kokkos::abs(force - p.friction_force));
-      p.friction_force = force;
-    }
-  }
-};
-
-}  // namespace kernels
 
 /// The boundaries that do not stick, as a term of the potential of a grid. ParticleStepper tells it
-/// (`hold`) what is where. Where there is friction, give the time stepper two passes or more.
+/// (`hold`) what is where. Where there is friction or separation, give the time stepper passes
+/// (Lagging): it takes those that something changes in, rarely more than three.
 template <class Precision_ = Mixed, class Space_ = DefaultSpace>
 class Slip {
 public:
@@ -285,8 +66,10 @@ public:
   }
 
   /// A step of h seconds begins, with nodes at `rest` and the boundaries where they will be.
-  void hold(Positions const& rest, BoundaryList<Space> const& boundaries, double h) {
+  void hold(Positions const& rest, Unknowns<Precision, Space> const& unknowns,
+            BoundaryList<Space> const& boundaries, double h) {
     nodes_ = static_cast<int>(rest.extent(0));
+    unknowns_ = unknowns;
     boundaries_ = boundaries.list();
     using Count = kernels::CountSlip<Space, Positions>;
     Count const count{boundaries_, boundaries.count(), rest};
@@ -296,20 +79,41 @@ public:
     grow(views_.pair, "slip_pairs", pairs);
     grow(views_.stiffness, "slip_stiffness", nodes_);
     views_.stick = params_.stick_speed * h;
-    views_.friction = false;
-    for (BoundarySpec const& spec : boundaries.specs()) views_.friction |= spec.friction > 0;
+    views_.friction = views_.separates = false;
+    for (BoundarySpec const& spec : boundaries.specs()) {
+      views_.friction |= spec.friction > 0;
+      views_.separates |= spec.contact == BoundaryContact::separate;
+    }
     for_each<Space>("list_slip", nodes_, kernels::ListSlip<Space, Positions>{count, h, views_});
-    reducer_.provide(nodes_, 1);
+    reducer_.provide(nodes_, 3);
   }
   void begin_step(StepStart<Precision, Space> const& start) const {
-    for_each<Space>(
-        "slip_stiffness", nodes_,
-        kernels::SlipStiffness<Space, Real>{start.stiffness, params_.steepness, views_.stiffness});
+    for_each<Space>("begin_slip", nodes_,
+                    kernels::BeginSlip<Space, Precision>{views_, boundaries_, start, unknowns_.mass,
+                                                         params_.steepness});
+    double const error = params_.settled * unknowns_.length / start.time_step;
+    negligible_ = 0.5 * start.mean_mass * nodes_ * error * error;
   }
   bool relag(Positions const& x) const {
-    if (!views_.friction) return false;
-    return maximum<Space>("relag_slip", nodes_, 0.0,
-                          kernels::Relag<Space, Precision>{views_, boundaries_, x}) > 0;
+    if (!views_.friction && !views_.separates) return false;
+    auto const errors =
+        reducer_.template sum<3>("slip_errors", nodes_,
+                                 kernels::SlipErrors<Space, Precision>{
+                                     {views_, boundaries_, x}, unknowns_.fixed, params_.steepness});
+    double const change = params_.friction_change;
+    bool const settled = double(errors[0]) <= negligible_;
+    bool const rubs = double(errors[1]) > change * change * double(errors[2]);
+    if (settled && !rubs) return false;
+    for_each<Space>("relag_slip", nodes_,
+                    kernels::RelagSlip<Space, Precision>{{views_, boundaries_, x}});
+    return true;
+  }
+  /// The force of a boundary on the nodes at x, N.
+  Vec3<double> force(Positions const& x, int boundary) const {
+    auto const sum = reducer_.template sum<3>(
+        "slip_force", nodes_,
+        kernels::SlipForce<Space, Precision>{{views_, boundaries_, x}, unknowns_.fixed, boundary});
+    return {double(sum[0]), double(sum[1]), double(sum[2])};
   }
 
   static constexpr bool couples = false;  ///< nodes (UncoupledTerm)
@@ -370,6 +174,8 @@ private:
 
   SlipParams params_;
   int nodes_ = 0;
+  Unknowns<Precision, Space> unknowns_;
+  mutable double negligible_ = 0;  ///< J
   kernels::SlipViews<Space> views_;
   Kokkos::View<Boundary const*, typename Space::memory> boundaries_;
   Reducer<Space, typename Precision::sum> reducer_;

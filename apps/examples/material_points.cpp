@@ -33,7 +33,9 @@ int main() {
         .contact = BoundaryContact::separate,
         .motion = at_rest({turn_matrix({{0, 0, 1}, -1.5707963267948966}), {0, 0, 0}})}});
 
-  ParticleStepper<ImplicitEuler<Ncg<DaiKou, BlockJacobi>>> stepper;
+  // Passes: what is to be held by a wall that separates is found by minimising.
+  using Euler = ImplicitEuler<Ncg<DaiKou, BlockJacobi>>;
+  ParticleStepper<Euler> stepper(Euler({}, {.passes = 8}));
   double time = 0;
   while (time < 0.3) {
     double const h = stepper.cfl_step(particles, dx, 0.01);

@@ -227,7 +227,7 @@ double particle_memory_needed(double particles, double per_cell, SolverOptions c
   // Particles on the host for reading and writing and on the device, with what the operator keeps
   // of each (45 numbers); nodes with their fields and history and coarser levels (125 blocks in a
   // row of an eighth of them); a matrix of their own where there is one. There are about twice as
-  // many nodes as cells in thick bodies, more in thin ones. (Measured: 2e4 to 4e5 particles.)
+  // many nodes as cells in thick bodies, more in thin ones.
   double const nodes = 3 * particles / per_cell;
   return 4e7 + particles * 1900 + nodes * (assembles ? 16000 : 5000);
 }

@@ -84,7 +84,7 @@ public:
                  Flows(start.flows)) {
     auto const born = Kokkos::create_mirror_view(born_);
     for (std::size_t p = 0; p < start.born.size(); ++p) born(p) = start.born[p];
-    Kokkos::deep_copy(born_, born);
+    assign(born_, born);
     particles_.count = static_cast<int>(start.initial());
     for (std::size_t p = start.initial(); p < start.list.size(); ++p) {
       source_speed_ = std::max(source_speed_, norm(start.list[p].v));
@@ -125,6 +125,10 @@ public:
   }
   NodesOfStep nodes() const override { return nodes_at(stepper_.nodes().x); }
   NodesOfStep start_nodes() override {
+    if (particles_.count == 0) {
+      throw Error("nothing has come out of a source when frame {} begins: compare a later one",
+                  steps_ + 1);
+    }
     grid_.rebuild(particles_, potential_.template term<ParticleTerms>().material_count());
     return nodes_at(grid_.rest());
   }
@@ -261,11 +265,15 @@ private:
     nodes.mass.assign(mass.data(), mass.data() + mass.extent(0));
     return nodes;
   }
-  /// Friction takes its forces from the minimisation before.
+  /// Friction takes its forces from the minimisation before, and what separates is held or let go
+  /// between minimisations: as often as something changes, which is rarely more than twice.
   Lagging lagging() const {
-    bool const friction = std::any_of(points_.boundaries.begin(), points_.boundaries.end(),
-                                      [](SceneBoundary const& b) { return b.friction > 0; });
-    return {friction ? 2 : 1};
+    int passes = 1;
+    for (SceneBoundary const& b : points_.boundaries) {
+      if (b.friction > 0) passes = std::max(passes, 2);
+      if (b.law == BoundaryLaw::separate) passes = 8;
+    }
+    return {passes};
   }
 
   /// What has come out of the sources by now is there.
