@@ -98,7 +98,9 @@ struct Boundary {
     }
     double const sign = outside ? -1 : 1;
     normal = pose.rotation * (sign * n);
-    return sign * d;
+    // Whether a node on a wall is held must not depend on how the wall was turned into its place.
+    double const round_off = 1e-14 * (norm(x) + norm(pose.translation));
+    return Kokkos::abs(d) <= round_off ? 0 : sign * d;
   }
   KOKKOS_FUNCTION bool holds(Vec3<double> const& x) const {
     Vec3<double> normal;

@@ -221,8 +221,9 @@ void require_memory(MeshSize const& size, SolverOptions const& solver) {
 
 double particle_memory_needed(double particles, double per_cell, SolverOptions const& solver) {
   std::string const& method = solver.text("method");
-  bool const assembles = method == "hot" || method == "hot_quadratic" || method == "pn_pcg" ||
-                         method == "pn_mgpcg" ||
+  bool const assembles = method.starts_with("hot") || method == "lbfgs_h" ||
+                         method == "lbfgs_gmg" ||
+                         (method.starts_with("pn_") && method != "pn_pcg_mf") ||
                          (method == "newton" && solver.text("hessian") != "matrix_free");
   // Particles on the host for reading and writing and on the device, with what the operator keeps
   // of each (45 numbers); nodes with their fields and history and coarser levels (125 blocks in a
