@@ -2,6 +2,7 @@
 #include <taut/apps/bench/hot_counts.hpp>
 #include <taut/apps/bench/variants.hpp>
 #include <taut/apps/program/particle_potential.hpp>
+#include <taut/core/exec/copy.hpp>
 #include <taut/core/fem/element_material.hpp>
 #include <taut/mpm/particle_multigrid.hpp>
 #include <taut/mpm/sampling.hpp>

@@ -1,5 +1,6 @@
 #include <taut/apps/program/particle_methods.hpp>
 #include <taut/apps/program/particle_simulation.hpp>
+#include <taut/core/exec/copy.hpp>
 #include <taut/core/report/error.hpp>
 #include <taut/integrators/time_stepper.hpp>
 #include <taut/materials/invariants.hpp>

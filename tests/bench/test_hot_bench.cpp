@@ -73,9 +73,13 @@ TEST_CASE("a row per kernel of material points, level and cycle", "[bench]") {
 }
 
 TEST_CASE("options of the bench of material points are checked first", "[bench]") {
-  auto const refused = [](HotBenchOptions const& options, std::string const& part) {
+  HotBenchOptions options;
+  auto const refused = [&](std::string const& part) {
     CHECK_THROWS_WITH(bench_hot_command(options), ContainsSubstring(part));
   };
-  refused({.cells = {2}}, "--cells 2: it must be 4 to 256");
-  refused({.seconds = 0}, "--seconds 0: it must be above 0");
+  options.cells = {2};
+  refused("--cells 2: it must be 4 to 256");
+  options = {};
+  options.seconds = 0;
+  refused("--seconds 0: it must be above 0");
 }

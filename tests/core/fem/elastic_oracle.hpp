@@ -2,6 +2,7 @@
 // of the patch sweeps.
 #pragma once
 
+#include <taut/core/exec/copy.hpp>
 #include <taut/core/fem/rest_shape.hpp>
 #include <taut/materials/elastic.hpp>
 
