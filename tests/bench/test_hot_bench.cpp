@@ -9,6 +9,7 @@
 #include <nlohmann/json.hpp>
 
 #include <algorithm>
+#include <cstdlib>
 #include <set>
 
 using Catch::Matchers::ContainsSubstring;
@@ -42,7 +43,7 @@ TEST_CASE("a row per kernel of material points, level and cycle", "[bench]") {
     kernels.insert(row.kernel);
     CHECK(row.ns > 0);
     CHECK(row.cells == 6);
-    CHECK(row.particles == 8 * 216);
+    CHECK(std::abs(row.particles - 8 * 216) < 20);  // blue noise
     CHECK(row.nodes > 0);
     CHECK((row.fraction > 0) == (row.bytes > 0));
     if (row.per == "particle") CHECK(row.cycle.empty());
