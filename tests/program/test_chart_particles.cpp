@@ -116,14 +116,16 @@ TEST_CASE("totals run whole scenes, each method by its own rule", "[chart][mpm]"
     CHECK((number(row, "linear_iterations") > 0) == (row.at("method") == "PN-PCG"));
   }
   options.frames = {1};
-  CHECK_THROWS_MATCHES(chart(options), Error, MessageMatches(ContainsSubstring("time.frames=N")));
+  options.force = true;
+  CHECK_THROWS_MATCHES(chart_command(options), Error,
+                       MessageMatches(ContainsSubstring("time.frames=N")));
 }
 
 TEST_CASE("charts of particles refuse what is of meshes", "[chart][mpm]") {
   ScratchFolder const folder;
   ChartOptions options = options_for(folder, bar);
   auto const refused = [&](std::string const& part) {
-    CHECK_THROWS_MATCHES(chart(options), Error, MessageMatches(ContainsSubstring(part)));
+    CHECK_THROWS_MATCHES(chart_command(options), Error, MessageMatches(ContainsSubstring(part)));
   };
   options.methods = {"hott"};
   refused("did you mean \"hot\"?");
