@@ -374,9 +374,13 @@ def main():
     title = ", ".join([facts["scene"], *facts.get("with", [])])
     figure.text(0.02, 1 - 0.12 / inches, title, va="top", fontsize=13, fontweight="bold")
     if facts["kind"] == "sweep":  # what is swept is on the axis
-        facts["materials"] = re.sub(r" \(.*?\)", "", facts["materials"])
+        models = re.sub(r" \(.*?\)", "", facts["materials"]).split(", ")
+        facts["materials"] = ", ".join(dict.fromkeys(models))
         facts["integrator"] = f"step {facts['frame']} of {facts['integrator']}"
-    figure.text(0.02, 1 - 0.40 / inches, describe(facts), va="top", color="#666666")
+    below_title = describe(facts)
+    if len(below_title) > 165:
+        below_title = below_title.replace(".  ", ".\n", 1)
+    figure.text(0.02, 1 - 0.40 / inches, below_title, va="top", color="#666666")
     for axes in rated:
         add_rates(axes)
     figure.canvas.draw()  # fixes the limits that labels are placed by
