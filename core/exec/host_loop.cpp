@@ -50,6 +50,10 @@ void host_loop(Execution const& execution, std::string const& label, int n, Rang
                void const* functor) {
   if (n <= 0) return;
   Ranges const ranges(execution, n);
+  if (ranges.count() == 1) {  // no other thread has to wake for it
+    run(functor, 0, n);
+    return;
+  }
   Kokkos::parallel_for(label, Kokkos::RangePolicy<Execution>(execution, 0, ranges.count()),
                        Loop{run, functor, ranges});
 }
