@@ -11,7 +11,15 @@
 namespace taut {
 namespace {
 
-/// max_i |x_i - y_i|; NaN if any of them is.
+double energy_scale(Scene const& scene, int step) {
+  if (scene.scheme == TimeScheme::quasi_static) return 1;
+  double const h2 = scene.step * scene.step;
+  bool const bdf2 = scene.scheme == TimeScheme::bdf2 && step > 1;
+  return bdf2 ? h2 * Bdf2Rule::coefficients(1).scale : h2;
+}
+
+}  // namespace
+
 double largest_distance(std::vector<Point> const& x, std::vector<Point> const& y) {
   double largest = 0;
   for (std::size_t i = 0; i < x.size(); ++i) {
@@ -22,15 +30,6 @@ double largest_distance(std::vector<Point> const& x, std::vector<Point> const& y
   }
   return std::sqrt(largest);
 }
-
-double energy_scale(Scene const& scene, int step) {
-  if (scene.scheme == TimeScheme::quasi_static) return 1;
-  double const h2 = scene.step * scene.step;
-  bool const bdf2 = scene.scheme == TimeScheme::bdf2 && step > 1;
-  return bdf2 ? h2 * Bdf2Rule::coefficients(1).scale : h2;
-}
-
-}  // namespace
 
 MeshMeasure::MeshMeasure(Scene const& scene, SceneGeometry const& geometry, int step,
                          std::vector<Point> const& before, std::vector<Point> solution,

@@ -16,6 +16,9 @@
 
 namespace taut {
 
+/// max_i |x_i - y_i|, m; NaN if any of them is.
+double largest_distance(std::vector<Point> const& x, std::vector<Point> const& y);
+
 class StepMeasure {
 public:
   virtual ~StepMeasure() = default;

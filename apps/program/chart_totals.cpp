@@ -3,9 +3,7 @@
 #include <taut/core/report/error.hpp>
 #include <taut/core/report/timer.hpp>
 
-#include <algorithm>
 #include <array>
-#include <cmath>
 #include <limits>
 
 namespace taut {
@@ -45,14 +43,6 @@ Total run(Simulation& simulation, int frames, double max_seconds) {
   return total;
 }
 
-double largest(std::vector<Point> const& x, std::vector<Point> const& y) {
-  double most = 0;
-  for (std::size_t i = 0; i < x.size() && i < y.size(); ++i) {
-    most = std::max(most, std::hypot(x[i][0] - y[i][0], x[i][1] - y[i][1], x[i][2] - y[i][2]));
-  }
-  return most;
-}
-
 /// Runs of one scene.
 class Totals {
 public:
@@ -63,8 +53,7 @@ public:
       all_.push_back(
           {method.label, load_scene(file, with(options.scene.changes, method.overrides))});
     }
-    // The scene by its own method, a thousand times as accurate: both ends of the frames are then
-    // known.
+    // The scene by its own method, a thousand times as accurate: what errors are measured from.
     std::array const exact{
         fmt::format("solver.tolerance={}", scene_.solver.number("tolerance") / 1e3)};
     exact_ = load_scene(file, with(options.scene.changes, exact));
@@ -77,7 +66,6 @@ public:
   /// The rows.
   std::string run() const {
     auto const solver = steps_->whole(exact_);
-    std::vector<Point> const start = solver->positions();
     constexpr double patience = 20;  // for it, in times of the methods' seconds
     Total const reference = taut::run(*solver, scene_.frames, patience * options_.max_seconds);
     fmt::print("{}: {}, {} frames\n{:<26} {:>8} {:>10} {:>11} {:>11} {:>11}  ended\n", scene_.name,
@@ -88,8 +76,8 @@ public:
       auto const simulation = steps_->whole(one.scene);
       Total const total = taut::run(*simulation, scene_.frames, options_.max_seconds);
       bool const comparable = !total.end.empty() && !reference.end.empty();
-      double const error =
-          comparable ? largest(total.end, reference.end) : std::numeric_limits<double>::quiet_NaN();
+      double const error = comparable ? largest_distance(total.end, reference.end)
+                                      : std::numeric_limits<double>::quiet_NaN();
       rows += fmt::format("{},{},{},{},{},{},{},{},{},{}\n", scene_.name, one.label, total.frames,
                           scene_.frames, field(total.seconds), total.iterations,
                           total.linear_iterations, total.converged, field(error), total.ended);
