@@ -1,4 +1,5 @@
 #include <taut/apps/program/obstacle_terms.hpp>
+#include <taut/apps/program/rigid_frames.hpp>
 #include <taut/contact/obstacle.hpp>
 
 #include <limits>
@@ -7,15 +8,6 @@ namespace taut {
 
 namespace {
 
-Vec3<double> to_vector(Point const& x) { return {x[0], x[1], x[2]}; }
-
-RigidPose to_pose(RigidMap const& map) {
-  RigidPose pose;
-  for (int i = 0; i < 3; ++i)
-    for (int j = 0; j < 3; ++j) pose.rotation(i, j) = map.rotation[i][j];
-  pose.translation = to_vector(map.translation);
-  return pose;
-}
 RigidMap to_map(RigidPose const& pose) {
   RigidMap map;
   for (int i = 0; i < 3; ++i) {
@@ -30,10 +22,10 @@ struct ToShape {
   template <class Use>
   static auto with(SceneObstacle const& obstacle, Use const& use) {
     if (auto const* half = std::get_if<HalfSpaceShape>(&obstacle.geometry)) {
-      return use(HalfSpace{to_vector(half->point), to_vector(half->normal)});
+      return use(HalfSpace{to_vec(half->point), to_vec(half->normal)});
     }
     if (auto const* box = std::get_if<InsideBoxShape>(&obstacle.geometry)) {
-      return use(InsideBox{{0, 0, 0}, to_vector(box->size)});
+      return use(InsideBox{{0, 0, 0}, to_vec(box->size)});
     }
     if (auto const* sphere = std::get_if<InsideSphereShape>(&obstacle.geometry)) {
       return use(InsideBall{{0, 0, 0}, sphere->radius});
@@ -61,7 +53,7 @@ public:
     auto const faces = taut::place(term_.shape(), term_.pose());
     double least = std::numeric_limits<double>::infinity();
     for (int f = 0; f < faces.count; ++f) {
-      least = std::min(least, distance_to(faces.face[f], to_vector(x) - faces.origin).distance);
+      least = std::min(least, distance_to(faces.face[f], to_vec(x) - faces.origin).distance);
     }
     return least;
   }

@@ -145,14 +145,6 @@ BoundarySpec spec_of(SceneSource const& source) {
 
 }  // namespace
 
-RigidPose to_pose(RigidMap const& map) {
-  RigidPose pose;
-  for (int r = 0; r < 3; ++r)
-    for (int c = 0; c < 3; ++c) pose.rotation(r, c) = map.rotation[r][c];
-  pose.translation = to_vec(map.translation);
-  return pose;
-}
-
 RigidMap frame_of(CylinderShape const& c) {
   Point axis{};
   axis[static_cast<std::size_t>(c.axis)] = 1;

@@ -1,14 +1,11 @@
 // Where the shapes of a scene of material points are, as poses.
 #pragma once
 
+#include <taut/apps/program/rigid_frames.hpp>
 #include <taut/apps/program/scene.hpp>
 #include <taut/mpm/boundary.hpp>
 
 namespace taut {
-
-inline Vec3<double> to_vec(Point const& p) { return {p[0], p[1], p[2]}; }
-inline Point to_point(Vec3<double> const& x) { return {x[0], x[1], x[2]}; }
-RigidPose to_pose(RigidMap const& map);
 
 /// Of a solid whose axis is y, to the axis of the shape.
 RigidMap frame_of(CylinderShape const& cylinder);
