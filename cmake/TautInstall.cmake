@@ -4,7 +4,7 @@
 include(CMakePackageConfigHelpers)
 set(package_folder "${CMAKE_INSTALL_LIBDIR}/cmake/Taut")
 
-install(TARGETS taut taut_usage EXPORT TautTargets)
+install(TARGETS taut taut_late taut_all taut_usage EXPORT TautTargets)
 foreach(room IN LISTS rooms)
   if(IS_DIRECTORY "${PROJECT_SOURCE_DIR}/${room}")
     install(DIRECTORY ${room} DESTINATION ${CMAKE_INSTALL_INCLUDEDIR}/taut FILES_MATCHING PATTERN "*.hpp")

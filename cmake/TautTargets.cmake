@@ -86,6 +86,8 @@ function(taut_target target)
     target_compile_options(${target} PRIVATE ${warnings} -Wpedantic $<$<BOOL:${TAUT_WARNINGS_AS_ERRORS}>:-Werror>)
     if(CMAKE_CXX_COMPILER_ID STREQUAL "GNU")
       target_compile_options(${target} PRIVATE -fpch-preprocess)  # for ccache
+      # GCC collects its garbage when its heap has grown by so many kB: a tenth of the time, for a quarter more memory.
+      target_compile_options(${target} PRIVATE --param=ggc-min-heapsize=1500000)
     endif()
   endif()
 endfunction()

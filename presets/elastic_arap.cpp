@@ -3,7 +3,5 @@
 namespace taut {
 
 template class ElasticTets<Elastic<Arap>, Fp64>;
-template class ElasticTets<Elastic<Arap>, Mixed>;
-template class ElasticTets<Elastic<Arap>, Fp32>;
 
 }  // namespace taut

@@ -3,7 +3,5 @@
 namespace taut {
 
 template class ElasticTets<Elastic<FixedCorotated>, Fp64>;
-template class ElasticTets<Elastic<FixedCorotated>, Mixed>;
-template class ElasticTets<Elastic<FixedCorotated>, Fp32>;
 
 }  // namespace taut

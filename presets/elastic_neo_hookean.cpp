@@ -3,7 +3,5 @@
 namespace taut {
 
 template class ElasticTets<Elastic<NeoHookean>, Fp64>;
-template class ElasticTets<Elastic<NeoHookean>, Mixed>;
-template class ElasticTets<Elastic<NeoHookean>, Fp32>;
 
 }  // namespace taut

@@ -3,7 +3,5 @@
 namespace taut {
 
 template class ElasticTets<Elastic<StableNeoHookean>, Fp64>;
-template class ElasticTets<Elastic<StableNeoHookean>, Mixed>;
-template class ElasticTets<Elastic<StableNeoHookean>, Fp32>;
 
 }  // namespace taut

@@ -3,7 +3,5 @@
 namespace taut {
 
 template class ElasticTets<Elastic<StableNeoHookean2018>, Fp64>;
-template class ElasticTets<Elastic<StableNeoHookean2018>, Mixed>;
-template class ElasticTets<Elastic<StableNeoHookean2018>, Fp32>;
 
 }  // namespace taut

@@ -1,10 +1,15 @@
 #include <taut/apps/program/command_line.hpp>
+#include <taut/apps/program/late_part.hpp>
 #include <taut/apps/program/scene_value.hpp>
 #include <taut/core/report/error.hpp>
 
 #include <fmt/core.h>
 
+#include <unistd.h>
+
 #include <algorithm>
+#include <cstdlib>
+#include <filesystem>
 #include <new>
 
 namespace taut {
@@ -19,9 +24,28 @@ std::optional<std::string> unknown_command(std::string const& program,
                      suggestion(": did you mean \"", argv[1], views, "\"?"), program);
 }
 
+int hand_over(std::string const& program, char** argv, std::string const& what) {
+  if (char const* build = std::getenv("TAUT_BUILD")) {
+    if (std::system(fmt::format("{} {}", build, program).c_str()) != 0) {
+      fmt::print(stderr, "taut: {} is of {}, which could not be built\n", what, program);
+      return 1;
+    }
+  }
+  std::filesystem::path const path =
+      std::filesystem::read_symlink("/proc/self/exe").replace_filename(program);
+  execv(path.c_str(), argv);
+  fmt::print(stderr,
+             "taut: {} is of {}, which cannot be started: build it (the script ./taut does, or "
+             "cmake --build with --target {})\n",
+             what, path.string(), program);
+  return 1;
+}
+
 int ending_in_words(std::function<int()> const& command) {
   try {
     return command();
+  } catch (LeftToTheWhole const&) {
+    throw;
   } catch (Error const& error) {
     fmt::print(stderr, "taut: {}\n", error.what());
   } catch (std::bad_alloc const&) {

@@ -29,7 +29,16 @@ std::optional<std::string> unknown_command(std::string const& program,
                                            std::vector<std::string> const& commands, int argc,
                                            char** argv);
 
-/// The exit status of `command`; what it throws becomes a sentence for the user, and 1.
+/// The program `taut`, from its command line to its exit status.
+int run_program(int argc, char** argv);
+
+/// Becomes the program of this name, which stands beside the present one, for the sake of `what`.
+/// If the environment holds TAUT_BUILD, a command that takes the name of a target, that is called
+/// first. Returns, with an exit status, only where that program cannot be had.
+int hand_over(std::string const& program, char** argv, std::string const& what);
+
+/// The exit status of `command`. What it throws becomes a sentence for the user, and 1; but
+/// LeftToTheWhole is the caller's.
 int ending_in_words(std::function<int()> const& command);
 
 }  // namespace taut

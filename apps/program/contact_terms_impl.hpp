@@ -2,6 +2,10 @@
 #pragma once
 
 #include <taut/apps/program/contact_terms.hpp>
+#include <taut/apps/program/late_part.hpp>
+#include <taut/core/report/error.hpp>
+
+#include <fmt/ranges.h>
 
 namespace taut {
 
@@ -35,9 +39,36 @@ std::shared_ptr<ProgramContact<P> const> add_contact_of(AnySteppedTerms<P>& term
   return std::make_shared<Handle>(term);
 }
 
-/// In fp64: the policies that differ from the default. Null if they are not compiled together.
-std::shared_ptr<ProgramContact<Fp64> const> add_other_contact(AnySteppedTerms<Fp64>& terms,
-                                                              ContactPart<Fp64> const& part,
-                                                              ContactOptions const& options);
+/// Policies that differ from the default. Its result is null where they are not compiled together.
+inline constinit LatePart<std::shared_ptr<ProgramContact<Fp64> const>(
+    AnySteppedTerms<Fp64>&, ContactPart<Fp64> const&, ContactOptions const&)>
+    add_other_contact = {};
+
+template <class P>
+std::shared_ptr<ProgramContact<P> const> add_contact_term(AnySteppedTerms<P>& terms,
+                                                          ContactPart<P> const& part,
+                                                          ContactOptions const& options) {
+  ContactOptions const defaults;
+  std::vector<std::string> others;
+  for (char const* key : {"barrier", "curvature", "search", "bound"}) {
+    if (options.text(key) != defaults.text(key)) {
+      others.push_back(fmt::format("{} = \"{}\"", key, options.text(key)));
+    }
+  }
+  if (!options.flag("mollifier")) others.push_back("mollifier = false");
+  if (others.empty()) return add_contact_of<P>(terms, part, options);
+  if constexpr (std::same_as<P, Fp64>) {
+    auto added = add_other_contact(fmt::format("[contact]: {}", fmt::join(others, " and ")), terms,
+                                   part, options);
+    if (added) return added;
+    throw Error(
+        "[contact]: {} are not compiled together: change one of them at a time, or curvature, "
+        "mollifier and bound as in the PNCG paper (truncated, false, half_dhat)",
+        fmt::join(others, " and "));
+  } else {
+    throw Error("[contact]: {} is compiled for fp64 alone: set solver.precision = \"fp64\"",
+                fmt::join(others, " and "));
+  }
+}
 
 }  // namespace taut

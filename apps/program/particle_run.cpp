@@ -19,9 +19,13 @@ public:
                 run_identity(options.scene.changes, scene, particles)),
         scene_(scene),
         particles_(particles),
-        simulation_(ParticleSimulation::create(scene, particles)) {}
+        simulation_(ParticleSimulation::create(scene, particles)) {
+    if (scene.output.vdb) write_grid_late.require(vdb);
+  }
 
 private:
+  static constexpr char const* vdb = "output.vdb = true";
+
   Simulation& simulation() override { return *simulation_; }
   NewtonReport step() override {
     try {
@@ -54,8 +58,8 @@ private:
     result.append(simulation_->time(), simulation_->positions(), simulation_->velocities(),
                   simulation_->scalars());
     if (!scene_.output.vdb) return;
-    write_grid(folder() / "vdb" / fmt::format("frame_{:05}.vdb", simulation_->steps()),
-               simulation_->grid());
+    write_grid_late(vdb, folder() / "vdb" / fmt::format("frame_{:05}.vdb", simulation_->steps()),
+                    simulation_->grid());
   }
 
   void add_to_summary(Record& summary) const override {

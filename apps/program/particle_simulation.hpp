@@ -2,6 +2,7 @@
 // scene, time.step seconds, which takes as many steps of the grid as its particles ask for.
 #pragma once
 
+#include <taut/apps/program/late_part.hpp>
 #include <taut/apps/program/particle_geometry.hpp>
 #include <taut/apps/program/simulation.hpp>
 #include <taut/mpm/grid_output.hpp>
@@ -48,5 +49,8 @@ public:
 
 /// Particles with J <= 0, or of which something is not a number, ascending.
 std::vector<std::size_t> broken_particles(std::vector<Particle> const& particles);
+
+/// write_grid, which takes long to compile.
+inline constinit LatePart<void(std::filesystem::path const&, GridOutput const&)> write_grid_late;
 
 }  // namespace taut

@@ -9,7 +9,7 @@
 #include <catch2/matchers/catch_matchers_floating_point.hpp>
 #include <catch2/matchers/catch_matchers_string.hpp>
 
-#include <nlohmann/json.hpp>
+#include <support/data.hpp>
 
 #include <cmath>
 #include <set>
@@ -59,7 +59,7 @@ TEST_CASE("a row per material, precision and kernel", "[bench]") {
   MachineRates const machine{2, 10, 50, 20};
   std::vector<BenchRow> const rows = measure_elastic(options, machine);
 
-  auto const list = nlohmann::json::parse(to_json(rows));
+  auto const list = test::parse_json(to_json(rows));
   REQUIRE(list.is_array());
   REQUIRE(list.size() == rows.size());
   std::set<std::string> seen;

@@ -178,8 +178,7 @@ TEST_CASE("the models reproduce the shared vectors", "[materials]") {
 }
 
 TEST_CASE("the projected 9x9 of fixed corotated reproduces the shared vectors", "[materials]") {
-  auto const cases =
-      nlohmann::json::parse(std::ifstream(test::data_file("vectors/hot_vectors.json")))["fcr"];
+  auto const cases = test::hot_vectors("fcr");
   for (auto const& c : cases) {
     INFO(c["name"]);
     Lame<double> const m{c["mu"], c["lam"]};

@@ -66,9 +66,7 @@ struct GoldenStep {
 
   /// `coarser`: on a grid whose spacing is that many times as large.
   explicit GoldenStep(std::string const& which, int coarser = 1)
-      : golden(nlohmann::json::parse(std::ifstream(data_file("vectors/hot_vectors.json")))
-                   .at("one_step_goldens")
-                   .at(which)),
+      : golden(hot_vectors("one_step_goldens").at(which)),
         dx(coarser * double(golden.at("dx"))),
         h(golden.at("dt")),
         gravity{golden.at("gravity")[0], golden.at("gravity")[1], golden.at("gravity")[2]},

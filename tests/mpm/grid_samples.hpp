@@ -1,7 +1,6 @@
 // Grids and matrices to test levels on, and plain readings of them: maps of places, dense matrices.
 #pragma once
 
-#include <Eigen/Dense>
 #include <taut/mpm/grid_level.hpp>
 #include <taut/mpm/level_operator.hpp>
 
@@ -10,13 +9,14 @@
 #include <random>
 #include <set>
 
+#include "support/dense.hpp"
+
 namespace taut::test {
 
 using Host = Kokkos::DefaultHostExecutionSpace;
 using Right = Space<Host, Kokkos::LayoutRight>;
 using Left = Space<Host, Kokkos::LayoutLeft>;
 using Place = std::array<int, 3>;
-using Dense = Eigen::MatrixXd;
 
 inline LeafList leaf_list(std::set<Place> const& places) {
   std::map<Place, LeafMask> leaves;

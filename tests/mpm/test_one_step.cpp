@@ -23,8 +23,7 @@ using Solid = ElasticParticles<Elastic<FixedCorotated, FullProjection>, Quadrati
 using Exact = Newton<Direct, Identity, SufficientDecrease, DecrementWindow, P>;
 
 TEST_CASE("one step of a block agrees with the reference", "[mpm][stepper]") {
-  auto const all = nlohmann::json::parse(std::ifstream(test::data_file("vectors/hot_vectors.json")))
-                       .at("one_step_goldens");
+  auto const all = test::hot_vectors("one_step_goldens");
   for (std::string const which : {"stretch", "drop", "hetero"}) {
     INFO(which);
     auto const golden = all.at(which);

@@ -94,8 +94,7 @@ TEMPLATE_TEST_CASE("weights of a particle in fp32 are those in fp64", "[mpm][spl
 }
 
 TEST_CASE("quadratic weights agree with the reference's", "[mpm][spline]") {
-  auto const file = test::data_file("vectors/hot_vectors.json");
-  auto const all = nlohmann::json::parse(std::ifstream(file)).at("bspline");
+  auto const all = test::hot_vectors("bspline");
   REQUIRE(all.size() >= 3);
   for (auto const& one : all) {
     double const dx = one.at("dx");

@@ -1,7 +1,7 @@
 // Charts of small scenes, and their data as tests read it.
 #pragma once
 
-#include <taut/apps/program/chart_table.hpp>
+#include <taut/apps/chart/table.hpp>
 #include <taut/core/io/file.hpp>
 
 #include <map>

@@ -17,9 +17,8 @@ struct Outcome {
   std::string text;  ///< of stdout and stderr
 };
 
-inline Outcome taut_with(std::string const& arguments) {
-  std::string const command = program().string() + " " + arguments + " 2>&1";
-  std::FILE* pipe = ::popen(command.c_str(), "r");
+inline Outcome outcome_of(std::string const& command) {
+  std::FILE* pipe = ::popen((command + " 2>&1").c_str(), "r");
   REQUIRE(pipe != nullptr);
   Outcome outcome{-1, {}};
   std::array<char, 4096> buffer;
@@ -27,6 +26,10 @@ inline Outcome taut_with(std::string const& arguments) {
     outcome.text.append(buffer.data(), n);
   outcome.status = WEXITSTATUS(::pclose(pipe));
   return outcome;
+}
+
+inline Outcome taut_with(std::string const& arguments) {
+  return outcome_of(program().string() + " " + arguments);
 }
 
 inline void says(std::string const& arguments, int status, std::string const& part) {

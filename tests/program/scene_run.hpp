@@ -7,7 +7,7 @@
 #include <taut/core/io/file.hpp>
 #include <taut/core/io/vtkhdf.hpp>
 
-#include <nlohmann/json.hpp>
+#include <support/data.hpp>
 
 #include <sstream>
 #include <vector>
@@ -28,13 +28,11 @@ struct SceneRun {
   }
   Scene scene() const { return load_scene(options.scene.scene, options.scene.changes); }
   ResultReader result() const { return ResultReader(options.out / "result.vtkhdf"); }
-  nlohmann::json summary() const {
-    return nlohmann::json::parse(read_file(options.out / "summary.json"));
-  }
+  nlohmann::json summary() const { return test::read_json(options.out / "summary.json"); }
   std::vector<nlohmann::json> report() const {
     std::vector<nlohmann::json> lines;
     std::istringstream text(read_file(options.out / "report.jsonl"));
-    for (std::string line; std::getline(text, line);) lines.push_back(nlohmann::json::parse(line));
+    for (std::string line; std::getline(text, line);) lines.push_back(test::parse_json(line));
     return lines;
   }
 };

@@ -22,6 +22,7 @@ public:
   ScratchFolder& operator=(ScratchFolder const&) = delete;
   ~ScratchFolder() { std::filesystem::remove_all(path_); }
 
+  std::filesystem::path const& path() const { return path_; }
   std::filesystem::path write(std::string const& name, std::string const& bytes) const {
     std::ofstream(path_ / name, std::ios::binary) << bytes;
     return path_ / name;

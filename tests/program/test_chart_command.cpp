@@ -1,5 +1,5 @@
 // `taut chart` from scene to data.csv.
-#include <taut/apps/program/chart_method.hpp>
+#include <taut/apps/chart/method.hpp>
 #include <taut/apps/program/methods.hpp>
 
 #include <catch2/catch_test_macros.hpp>

@@ -1,6 +1,6 @@
 // Charts of scenes with contact: errors of methods, the same step without contact, other scenes
 // beside it, and how far policies of contact go.
-#include <taut/apps/program/chart_policy.hpp>
+#include <taut/apps/chart/policy.hpp>
 #include <taut/core/report/error.hpp>
 
 #include <catch2/catch_test_macros.hpp>

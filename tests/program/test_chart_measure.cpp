@@ -1,6 +1,6 @@
 // The measure of charts is independent of what it judges: it must agree with the energies that the
 // minimisers see.
-#include <taut/apps/program/chart_measure.hpp>
+#include <taut/apps/chart/measure.hpp>
 #include <taut/apps/program/simulation.hpp>
 
 #include <catch2/catch_test_macros.hpp>

@@ -1,5 +1,5 @@
 // Charts of scenes of material points: the nodes of the first step of the grid in a frame.
-#include <taut/apps/program/chart_scene.hpp>
+#include <taut/apps/chart/scene.hpp>
 #include <taut/core/report/error.hpp>
 
 #include <catch2/catch_test_macros.hpp>

@@ -1,5 +1,5 @@
 // A step as a chart sees it, with a minimiser whose iterates are known.
-#include <taut/apps/program/chart_trace.hpp>
+#include <taut/apps/chart/trace.hpp>
 #include <taut/core/report/error.hpp>
 
 #include <catch2/catch_test_macros.hpp>

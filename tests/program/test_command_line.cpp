@@ -34,6 +34,33 @@ TEST_CASE("help has the program's name and an example everywhere", "[cli]") {
   }
 }
 
+TEST_CASE("what the first program leaves out is found in the whole one", "[cli]") {
+  test::ScratchFolder const folder;
+  std::string const scene = folder.write("plain.toml", test::plain_scene).string();
+  for (std::string const part : {"precision=mixed", "precision=fp32", "curvature=limit"}) {
+    auto const out = folder.path() / part;
+    says("run " + scene + " --frames 1 --set solver." + part + " --out " + out.string(), 0,
+         "steps 1 to 1");
+    CHECK(std::filesystem::exists(out / "result.vtkhdf"));
+  }
+}
+
+TEST_CASE("without the whole program, or with a build that fails, it is named", "[cli]") {
+  test::ScratchFolder const folder;
+  std::string const scene = folder.write("plain.toml", test::plain_scene).string();
+  auto const alone = folder.path() / "taut", out = folder.path() / "out";
+  std::filesystem::copy(test::program(), alone);
+  std::string const run = " run " + scene + " --set solver.precision=mixed --out " + out.string();
+  test::Outcome const outcome = test::outcome_of(alone.string() + run);
+  CHECK(outcome.status == 1);
+  CHECK_THAT(outcome.text, ContainsSubstring("precision = mixed is of") &&
+                               ContainsSubstring("--target taut_whole"));
+  CHECK_FALSE(std::filesystem::exists(out));
+  test::Outcome const unbuilt = test::outcome_of("TAUT_BUILD=false " + alone.string() + run);
+  CHECK(unbuilt.status == 1);
+  CHECK_THAT(unbuilt.text, ContainsSubstring("could not be built"));
+}
+
 TEST_CASE("scenes go on past a broken file", "[cli]") {
   test::ScratchFolder const folder;
   auto const broken = folder.write("broken.toml", "[[=");

@@ -7,7 +7,7 @@
 
 #include <fmt/format.h>
 #include <catch2/generators/catch_generators.hpp>
-#include <nlohmann/json.hpp>
+#include <support/data.hpp>
 
 using namespace taut;
 using namespace taut::test;
@@ -29,7 +29,7 @@ void runs_clean(Trial const& trial) {
   options.out = folder.write("place", "").parent_path() / "result";
   options.check = CheckRun::every_step;
   CHECK(run_command(options) == 0);
-  auto const summary = nlohmann::json::parse(read_file(options.out / "summary.json"));
+  auto const summary = test::read_json(options.out / "summary.json");
   CHECK(summary.at("ended") == "finished");
   CHECK(summary.at("steps_converged") == trial.frames);
   CHECK(summary.at("most_contacts") > 0);

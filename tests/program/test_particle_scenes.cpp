@@ -34,9 +34,7 @@ struct BuiltIn {
   }
   Scene scene() const { return load_scene(options.scene.scene, options.scene.changes); }
   ResultReader result() const { return ResultReader(options.out / "result.vtkhdf"); }
-  nlohmann::json summary() const {
-    return nlohmann::json::parse(read_file(options.out / "summary.json"));
-  }
+  nlohmann::json summary() const { return test::read_json(options.out / "summary.json"); }
 };
 
 struct Trial {

@@ -7,7 +7,7 @@
 
 #include <catch2/matchers/catch_matchers_exception.hpp>
 #include <catch2/matchers/catch_matchers_string.hpp>
-#include <nlohmann/json.hpp>
+#include <support/data.hpp>
 
 #include "scene_text.hpp"
 
@@ -38,9 +38,7 @@ struct Runner {
   void refused(std::string const& part) {
     CHECK_THROWS_MATCHES(run_command(options), Error, MessageMatches(ContainsSubstring(part)));
   }
-  nlohmann::json summary() const {
-    return nlohmann::json::parse(read_file(options.out / "summary.json"));
-  }
+  nlohmann::json summary() const { return test::read_json(options.out / "summary.json"); }
   ResultReader result() const { return ResultReader(options.out / "result.vtkhdf"); }
 };
 

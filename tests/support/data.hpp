@@ -1,32 +1,22 @@
 // The shared data of the tests: found through the environment variable TAUT_DATA_DIR.
 #pragma once
 
-#include <catch2/catch_test_macros.hpp>
 #include <nlohmann/json.hpp>
 
-#include <cstdlib>
 #include <filesystem>
-#include <fstream>
+#include <string>
 
 namespace taut::test {
 
 /// Path of a data file; skips the running test with a message where the data are absent.
-inline std::filesystem::path data_file(std::string const& relative) {
-  char const* directory = std::getenv("TAUT_DATA_DIR");
-  if (directory == nullptr ||
-      !std::filesystem::exists(std::filesystem::path(directory) / relative)) {
-    SKIP("needs " << relative << " in TAUT_DATA_DIR");
-  }
-  return std::filesystem::path(directory) / relative;
-}
+std::filesystem::path data_file(std::string const& relative);
 
-inline nlohmann::json vectors(std::string const& key) {
-  return nlohmann::json::parse(std::ifstream(data_file("vectors/pncg_vectors.json"))).at(key);
-}
+/// The parser is compiled once, here.
+nlohmann::json parse_json(std::string const& text);
+nlohmann::json read_json(std::filesystem::path const& file);
 
+nlohmann::json vectors(std::string const& key);
 /// Of the material point method.
-inline nlohmann::json hot_vectors(std::string const& key) {
-  return nlohmann::json::parse(std::ifstream(data_file("vectors/hot_vectors.json"))).at(key);
-}
+nlohmann::json hot_vectors(std::string const& key);
 
 }  // namespace taut::test

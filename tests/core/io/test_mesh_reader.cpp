@@ -95,7 +95,7 @@ TEST_CASE("the boundary of two tets is six faces that enclose their volume") {
 }
 
 TEST_CASE("the paper's TetGen meshes have the counts of the inventory") {
-  const auto inventory = nlohmann::json::parse(std::ifstream(data_file("mesh_inventory.json")));
+  const auto inventory = read_json(data_file("mesh_inventory.json"));
   REQUIRE(inventory.size() >= 19);
   for (auto const& [name, entry] : inventory.items()) {
     CAPTURE(name);

@@ -3,7 +3,7 @@
 #include <core/io/io_samples.hpp>
 #include <cstdint>
 #include <limits>
-#include <nlohmann/json.hpp>
+#include <support/data.hpp>
 #include <taut/core/io/file.hpp>
 #include <taut/core/report/progress.hpp>
 #include <taut/core/report/report_log.hpp>
@@ -31,7 +31,7 @@ TEST_CASE("a record keeps order and types; numbers survive, NaN becomes null") {
         R"("nested":{"x":1}})");
   Record foreign;
   foreign.set("file", "gr\xf6sser");  // Latin-1, not UTF-8
-  CHECK(nlohmann::json::parse(to_json(foreign)).is_object());
+  CHECK(parse_json(to_json(foreign)).is_object());
 }
 
 TEST_CASE("lines are in the file as soon as they are written") {
@@ -74,7 +74,7 @@ TEST_CASE("the summary is one object") {
   Record record;
   record.set("frames", 10).set("seconds", 1.25);
   write_summary(folder / "summary.json", record);
-  const auto json = nlohmann::json::parse(read_file(folder / "summary.json"));
+  const auto json = read_json(folder / "summary.json");
   CHECK(json.at("frames") == 10);
   CHECK(json.at("seconds") == 1.25);
 }

@@ -8,7 +8,7 @@
 //   |x - x*|_M / length,   |d|_M^2 = Sum_i m_i |d_i|^2 / Sum_i m_i.
 #pragma once
 
-#include <taut/apps/program/chart_trace.hpp>
+#include <taut/apps/chart/trace.hpp>
 
 namespace taut {
 

@@ -1,5 +1,5 @@
-#include <taut/apps/program/chart_method.hpp>
-#include <taut/apps/program/chart_trace.hpp>
+#include <taut/apps/chart/method.hpp>
+#include <taut/apps/chart/trace.hpp>
 #include <taut/core/report/error.hpp>
 #include <taut/core/report/timer.hpp>
 

@@ -18,11 +18,9 @@ struct Choice {
 template <class Pair = PairEnergy<>, class Search = Tree, class Bound = AdditiveCcd>
 constexpr auto policies = &add_contact_of<Fp64, Pair, Search, Bound>;
 
-}  // namespace
-
-std::shared_ptr<ProgramContact<Fp64> const> add_other_contact(AnySteppedTerms<Fp64>& terms,
-                                                              ContactPart<Fp64> const& part,
-                                                              ContactOptions const& options) {
+std::shared_ptr<ProgramContact<Fp64> const> add_compiled(AnySteppedTerms<Fp64>& terms,
+                                                         ContactPart<Fp64> const& part,
+                                                         ContactOptions const& options) {
   Choice const asked{options.text("barrier"), options.text("curvature"), options.text("search"),
                      options.text("bound"), options.flag("mollifier")};
   std::string const gn = "gauss_newton", bvh = "bvh", ccd = "additive_ccd";
@@ -48,5 +46,9 @@ std::shared_ptr<ProgramContact<Fp64> const> add_other_contact(AnySteppedTerms<Fp
   }
   return nullptr;
 }
+
+bool const filled = add_other_contact.fill(add_compiled);
+
+}  // namespace
 
 }  // namespace taut

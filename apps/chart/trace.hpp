@@ -1,7 +1,7 @@
 // One time step by one method, seen against the step's solution after every iteration.
 #pragma once
 
-#include <taut/apps/program/chart_measure.hpp>
+#include <taut/apps/chart/measure.hpp>
 #include <taut/apps/program/simulation.hpp>
 
 #include <optional>

@@ -1,5 +1,5 @@
-#include <taut/apps/program/chart.hpp>
-#include <taut/apps/program/chart_table.hpp>
+#include <taut/apps/chart/chart.hpp>
+#include <taut/apps/chart/table.hpp>
 #include <taut/apps/program/render_python.hpp>
 #include <taut/core/io/file.hpp>
 #include <taut/core/report/error.hpp>
@@ -125,5 +125,7 @@ int chart_command(ChartOptions const& options) {
   }
   return 0;
 }
+
+static bool const filled = chart_command_late.fill(chart_command);
 
 }  // namespace taut

@@ -1,8 +1,8 @@
 // How far policies of contact bring a scene: each runs it from the start, and ends at the first
 // step that is not clean. Inverted elements end it where the material forbids them; what tolerates
 // them goes on, and the row says since when.
-#include <taut/apps/program/chart_policy.hpp>
-#include <taut/apps/program/chart_table.hpp>
+#include <taut/apps/chart/policy.hpp>
+#include <taut/apps/chart/table.hpp>
 #include <taut/apps/program/intersections.hpp>
 #include <taut/apps/program/memory.hpp>
 #include <taut/apps/program/scene_result.hpp>

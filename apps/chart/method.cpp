@@ -1,4 +1,4 @@
-#include <taut/apps/program/chart_method.hpp>
+#include <taut/apps/chart/method.hpp>
 #include <taut/apps/program/methods.hpp>
 #include <taut/apps/program/particle_methods.hpp>
 #include <taut/core/report/error.hpp>

@@ -1,4 +1,4 @@
-#include <taut/apps/program/chart_table.hpp>
+#include <taut/apps/chart/table.hpp>
 
 #include <nlohmann/json.hpp>
 

@@ -2,8 +2,8 @@
 // rows under a line of column names.
 #pragma once
 
-#include <taut/apps/program/chart.hpp>
-#include <taut/apps/program/chart_method.hpp>
+#include <taut/apps/chart/chart.hpp>
+#include <taut/apps/chart/method.hpp>
 #include <taut/apps/program/scene_geometry.hpp>
 
 #include <string>

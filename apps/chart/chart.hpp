@@ -9,6 +9,7 @@
 #pragma once
 
 #include <taut/apps/program/commands.hpp>
+#include <taut/apps/program/late_part.hpp>
 
 #include <optional>
 
@@ -42,5 +43,6 @@ struct ChartOptions {
 
 /// Writes data.csv, data.json, chart.svg and chart.png. Throws Error.
 int chart_command(ChartOptions const& options);
+inline constinit LatePart<int(ChartOptions const&)> chart_command_late;
 
 }  // namespace taut

@@ -1,4 +1,4 @@
-#include <taut/apps/program/chart_policy.hpp>
+#include <taut/apps/chart/policy.hpp>
 #include <taut/core/report/error.hpp>
 
 #include <algorithm>

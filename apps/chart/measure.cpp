@@ -1,4 +1,4 @@
-#include <taut/apps/program/chart_measure.hpp>
+#include <taut/apps/chart/measure.hpp>
 #include <taut/core/report/error.hpp>
 #include <taut/integrators/time_stepper.hpp>
 #include <taut/materials/isotropic.hpp>

@@ -1,6 +1,6 @@
-#include <taut/apps/program/chart_method.hpp>
-#include <taut/apps/program/chart_scene.hpp>
-#include <taut/apps/program/chart_table.hpp>
+#include <taut/apps/chart/method.hpp>
+#include <taut/apps/chart/scene.hpp>
+#include <taut/apps/chart/table.hpp>
 #include <taut/apps/program/memory.hpp>
 #include <taut/apps/program/particle_simulation.hpp>
 #include <taut/core/report/error.hpp>

@@ -1,5 +1,5 @@
-#include <taut/apps/program/chart_scene.hpp>
-#include <taut/apps/program/chart_table.hpp>
+#include <taut/apps/chart/scene.hpp>
+#include <taut/apps/chart/table.hpp>
 #include <taut/core/report/error.hpp>
 #include <taut/core/report/timer.hpp>
 

@@ -1,0 +1,9 @@
+#include <taut/apps/program/contact_terms_impl.hpp>
+
+namespace taut {
+
+template std::shared_ptr<ProgramContact<Mixed> const> add_contact_term(AnySteppedTerms<Mixed>&,
+                                                                       ContactPart<Mixed> const&,
+                                                                       ContactOptions const&);
+
+}  // namespace taut
