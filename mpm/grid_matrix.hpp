@@ -9,6 +9,7 @@
 #include <taut/core/exec/growing.hpp>
 #include <taut/core/exec/parallel.hpp>
 #include <taut/core/math/floored_inverse.hpp>
+#include <taut/core/math/scalar.hpp>
 #include <taut/core/sparse/block_csr.hpp>
 #include <taut/mpm/node_block.hpp>
 
@@ -83,38 +84,77 @@ KOKKOS_FORCEINLINE_FUNCTION bool run_counts(Part part, int octant, int x, int y,
   return before ? order <= 0 : order >= 0;
 }
 
-/// sum_j A_ij x_j of row i over the runs that count; `x` is where the node is in a window of
-/// `part`. On the host in as many sums as a run has numbers, which are added up last: additions may
-/// not be reordered, and this is an order that fills the registers.
+/// Brings a run of row i near. Rows are read once per sweep, and half of one is no stream that
+/// hardware would see through.
 template <class S, class T, int radius>
-KOKKOS_FORCEINLINE_FUNCTION Vec3<T> row_times(GridMatrix<S, T, radius> const& a, int i,
-                                              Window<T, radius>& window, int place, int octant,
-                                              Part part) {
+KOKKOS_FORCEINLINE_FUNCTION void prefetch_run(GridMatrix<S, T, radius> const& a, int i, int first) {
+#if defined(__GNUC__) && !defined(__CUDACC__)
+  if constexpr (S::on_host && std::is_same_v<typename S::layout, Kokkos::LayoutRight>) {
+    constexpr int line = 64 / sizeof(T), numbers = 3 * StencilRow<radius>::padded;
+    T const* const run = &a.entry(i, first);
+    for (int k = 0; k < numbers; k += line) __builtin_prefetch(run + k);
+  }
+#endif
+  (void)a, (void)i, (void)first;
+}
+
+/// What is summed up side by side: a register on the host, where a run is as many as one.
+template <class S, class T, int radius>
+using RunPack = std::conditional_t<S::on_host && StencilRow<radius>::padded % host_lanes<T> == 0,
+                                   HostPack<T>, T>;
+
+/// sum_j A_ij x_j over the runs of the t-th node of a block that count; `x` is a window of `part`,
+/// and `next` the node that comes after. On the host in as many sums as a run has numbers, which
+/// are added up last: additions may not be reordered, and this is an order that fills the
+/// registers.
+template <class S, class T, int radius>
+KOKKOS_FORCEINLINE_FUNCTION Vec3<T> row_times(GridMatrix<S, T, radius> const& a,
+                                              NodeBlock<S> const& block, int t, int next,
+                                              Window<T, radius>& window, Part part) {
   using Row = StencilRow<radius>;
-  constexpr int sums = S::on_host ? Row::padded : 1;
-  T sum[3][sums] = {};
-  int const px = place / 16, py = place / 4 % 4, pz = place % 4;
-  T const* const row = &a.entry(i, 0);
+  using Pack = RunPack<S, T, radius>;
+  constexpr int width = ScalarTraits<Pack>::lanes, packs = S::on_host ? Row::padded / width : 1;
+  Pack sum[3][packs];
+  for (int r = 0; r < 3; ++r)
+    for (int k = 0; k < packs; ++k) sum[r][k] = Pack(T(0));
+  int const place = block.place[t], px = place / 16, py = place / 4 % 4, pz = place % 4;
+  bool const ahead = next >= 0 && next < block.count;
+  int const after = ahead ? block.node[next] : 0, after_place = ahead ? block.place[next] : 0;
+  T const* const row = &a.entry(block.node[t], 0);
   std::size_t const stride = a.entry.stride_1();
   for (int dx = -radius; dx <= radius; ++dx)
     for (int dy = -radius; dy <= radius; ++dy) {
-      if (!run_counts(part, octant, px, py, dx, dy)) continue;
-      T const* const x = window.at(px + dx, py + dy, pz - radius);
       int const first = Row::place(dx, dy, -radius, 0, 0);
-      for (int r = 0; r < 3; ++r) {
-        if constexpr (std::is_same_v<typename S::layout, Kokkos::LayoutRight>) {
-          T const* const run = row + first + r * Row::padded;
-          for (int k = 0; k < Row::padded; ++k) sum[r][k % sums] += run[k] * x[k];
-        } else {
-          T const* const run = row + (first + r * Row::padded) * stride;
-          for (int k = 0; k < Row::padded; ++k) sum[r][k % sums] += run[k * stride] * x[k];
+      if (ahead && run_counts(part, block.octant, after_place / 16, after_place / 4 % 4, dx, dy)) {
+        prefetch_run(a, after, first);
+      }
+      if (!run_counts(part, block.octant, px, py, dx, dy)) continue;
+      T const* const x = window.at(px + dx, py + dy, pz - radius);
+      for (int k = 0; k < Row::padded; k += width) {
+        Pack const own = load<Pack>(x + k);
+        for (int r = 0; r < 3; ++r) {
+          Pack& to = sum[r][k / width % packs];
+          if constexpr (std::is_same_v<typename S::layout, Kokkos::LayoutRight>) {
+            to = to + load<Pack>(row + first + r * Row::padded + k) * own;
+          } else {
+            T const* const run = row + (first + r * Row::padded + k) * stride;
+            if constexpr (width == 1) {
+              to = to + *run * own;
+            } else {
+              to = to + Pack([&](std::size_t lane) { return run[lane * stride]; }) * own;
+            }
+          }
         }
       }
     }
   Vec3<T> total;
   for (int r = 0; r < 3; ++r) {
-    total[r] = sum[r][0];
-    for (int k = 1; k < sums; ++k) total[r] += sum[r][k];
+    for (int k = 1; k < packs; ++k) sum[r][0] = sum[r][0] + sum[r][k];
+    T value[width];
+    store(sum[r][0], value);
+    for (int half = width / 2; half > 0; half /= 2)
+      for (int k = 0; k < half; ++k) value[k] += value[k + half];
+    total[r] = value[0];
   }
   return total;
 }
@@ -146,10 +186,42 @@ struct SweepBlocks {
     for (int t = 0; t < block.count; ++t) {
       int const m = backward ? block.count - 1 - t : t;
       int const i = block.node[m], place = block.place[m];
-      Vec3<T> const sum = row_times(a, i, window, place, octant, part);
+      Vec3<T> const sum = row_times(a, block, m, backward ? m - 1 : m + 1, window, part);
       T* const own = window.at(place / 16, place / 4 % 4, place % 4);
       Vec3<T> const value = update(i, Vec3<T>{own[0], own[1], own[2]}, sum);
       for (int c = 0; c < 3; ++c) own[c] = value[c];
+    }
+  }
+};
+
+/// A forward sweep that tells what it has passed from what is before it: hands `update` each node
+/// with its sums over the nodes before and after, and takes its new vector.
+template <class S, class T, int radius, class Update>
+struct RelaxBlocks {
+  GridMatrix<S, T, radius> a;
+  VectorField<T, S> x;
+  Update update;
+  int octant;
+
+  KOKKOS_FUNCTION void operator()(int leaf) const { sweep(leaf); }
+  [[gnu::noinline]] KOKKOS_FUNCTION void sweep(int leaf) const {
+    NodeBlock<S> const block(a.nodes, leaf, octant);
+    if (block.count == 0) return;
+    Window<T, radius> before, after;
+    before.load(a.nodes, block, x, Part::before);
+    after.load(a.nodes, block, x, Part::after);
+    auto const at = [&](Window<T, radius>& window, int t) {
+      int const place = block.place[t];
+      return window.at(place / 16, place / 4 % 4, place % 4);
+    };
+    for (int t = 0; t < block.count; ++t)
+      for (int c = 0; c < 3; ++c) at(after, t)[c] = x(block.node[t], c);
+    for (int t = 0; t < block.count; ++t) {
+      for (int c = 0; c < 3; ++c) at(after, t)[c] = 0;
+      Vec3<T> const passed = row_times(a, block, t, t + 1, before, Part::before);
+      Vec3<T> const to_come = row_times(a, block, t, t + 1, after, Part::after);
+      Vec3<T> const value = update(block.node[t], passed, to_come);
+      for (int c = 0; c < 3; ++c) at(before, t)[c] = value[c];
     }
   }
 };
@@ -239,6 +311,16 @@ void sweep_blocks(char const* name, GridMatrix<S, T, radius> const& a, VectorFie
   for (int c = 0; c < 8; ++c) {
     kernel.colour = backward ? 7 - c : c;
     for_each<S>(name, leaves, kernel);
+  }
+}
+
+/// The same in two sums, over colour after colour.
+template <class S, class T, int radius, class Update>
+void relax_blocks(char const* name, GridMatrix<S, T, radius> const& a, VectorField<T, S> const& x,
+                  Update const& update) {
+  for (int c = 0; c < 8; ++c) {
+    for_each<S>(name, a.nodes.leaves.count,
+                kernels::RelaxBlocks<S, T, radius, Update>{a, x, update, c});
   }
 }
 

@@ -5,8 +5,12 @@
 //   grad w_J = Sum_n P_nJ grad w_n,      block (I, J) += Sum_uv (grad w_I)_u K_uv (grad w_J)_v,
 //
 // over the fine nodes that are free (embedding.hpp). Particles of a cell see the same nodes, so
-// their blocks are added up before they go to memory: for each of the six pairs of components (k <=
-// l) a dense matrix over the nodes of the cell, in loops that fill registers.
+// their blocks are added up in registers before they go to memory, a row of nodes at a time:
+//
+//   y_p = (grad w_I)_u K_uv (3 x 9 numbers per particle),   row of I += Sum_p y_pv (grad w_J)_v
+//
+// for the J in I's line along z and after it; the other half of the matrix is the mirror image of
+// this one, and is taken from it at the end.
 //
 // Blocks of 4^3 cells of one colour, two blocks apart, share no row, and each is one thread's.
 #pragma once
@@ -46,7 +50,12 @@ struct AssembleCells {
   /// Blocks of a colour must share no row.
   static_assert(r <= 1, "a wider embedding is taken from the fine matrix (galerkin.hpp)");
   static constexpr int along = (K::width - 1 + 2 * r) / factor + 1;  ///< nodes along an axis
-  static constexpr int most = along * along * along, padded = (most + 7) / 8 * 8;
+  using Pack = std::conditional_t<S::on_host, HostPack<TM>, TM>;
+  static constexpr int width = ScalarTraits<Pack>::lanes;
+  KOKKOS_FORCEINLINE_FUNCTION static constexpr int whole(int n) {
+    return (n + width - 1) / width * width;
+  }
+  static constexpr int most = along * along * along, padded = whole(most);
   static constexpr int chunk = 8;  ///< particles at a time
   static constexpr int lanes = BlockSweep<S, T, K, false>::lanes;
   static_assert(along - 1 <= R);
@@ -60,6 +69,7 @@ struct AssembleCells {
   GridMatrix<S, TM, R> matrix;
   /// Per node of the matrix's grid: its row, or -1; empty: its number.
   Kokkos::View<int const*, typename S::memory> row_of;
+  bool half;  ///< only the lines of nodes from a node's own on, see MirrorRow
 
   /// The nodes that a cell sees of the matrix's grid.
   struct Cell {
@@ -71,14 +81,16 @@ struct AssembleCells {
     bool free;         ///< no fine node is fixed
     bool wanted;       ///< there is a row
   };
-  struct Gradients {
-    TM w[3][padded];
+  /// What a particle has to do with them.
+  struct Seen {
+    TM w[3][padded];            ///< the gradients of the nodes
+    TM stiffness[9][whole(9)];  ///< K_(k u)(l v) at [k + 3 u][l + 3 v]
   };
 
   KOKKOS_FUNCTION void operator()(int k) const {
     int const block = order(first + k);
     for (int patch = blocks.patch_begin(block); patch < blocks.patch_begin(block + 1); ++patch) {
-      for (int c = 0; c < 64; ++c) add_cell(patch, c);
+      add_patch(patch);
     }
   }
 
@@ -87,26 +99,28 @@ private:
     return data((std::size_t(slot / lanes) * operator_numbers + k) * lanes + slot % lanes);
   }
 
-  KOKKOS_FUNCTION void add_cell(int patch, int c) const {
-    int const local = BlockViews<K, S>::local(c >> 4, c >> 2 & 3, c & 3);
-    std::uint16_t const corner = static_cast<std::uint16_t>(4 * local);
-    int const begin = blocks.slot_begin(patch), end = begin + blocks.count(patch);
-    Cell cell;
-    int slot[chunk], count = 0;
-    bool known = false;
-    for (int s = begin; s < end; ++s) {
-      if (blocks.corner(s) != corner) continue;
-      if (!known) {
-        see(patch, c, local, cell);
-        known = true;
-        if (!cell.wanted) return;
+  /// Of every cell the particles of `chunk` rounds, then of the next.
+  KOKKOS_FUNCTION void add_patch(int patch) const {
+    constexpr int cells = 64;
+    using Views = BlockViews<K, S>;
+    int const begin = blocks.slot_begin(patch), count = blocks.count(patch);
+    for (int from = 0, round = 0; from < count; round += chunk) {
+      int slot[cells][chunk], held[cells] = {};
+      for (int now = round; now < round + chunk && from < count; ++now) {
+        for (int const end = blocks.round_end(begin + now); from < end; ++from) {
+          int const local = blocks.corner(begin + from) / 4;
+          int const c = 16 * (local / (Views::side * Views::side)) +
+                        4 * (local / Views::side % Views::side) + local % Views::side;
+          slot[c][held[c]++] = begin + from;
+        }
       }
-      slot[count++] = s;
-      if (count < chunk) continue;
-      add(cell, slot, count);
-      count = 0;
+      for (int c = 0; c < cells; ++c) {
+        if (held[c] == 0) continue;
+        Cell cell;
+        see(patch, c, Views::local(c >> 4, c >> 2 & 3, c & 3), cell);
+        if (cell.wanted) add(cell, slot[c], held[c]);
+      }
     }
-    if (count > 0) add(cell, slot, count);
   }
 
   KOKKOS_FUNCTION void see(int patch, int c, int local, Cell& cell) const {
@@ -142,11 +156,10 @@ private:
   }
 
   /// The gradients of the nodes of the cell at a particle, per fine cell.
-  KOKKOS_FUNCTION void gradients(Cell const& cell, int slot, Gradients& to) const {
+  KOKKOS_FUNCTION void gradients(Cell const& cell, int slot, Seen& to) const {
     Weights<K, TM> const at({TM(number(slot, 0)), TM(number(slot, 1)), TM(number(slot, 2))});
-    int const np = (cell.count + 7) / 8 * 8;
     for (int u = 0; u < 3; ++u)
-      for (int j = 0; j < np; ++j) to.w[u][j] = 0;
+      for (int j = 0; j < padded; ++j) to.w[u][j] = 0;
     if (cell.free) {
       TM w[3][along], d[3][along];
       for (int c = 0; c < 3; ++c)
@@ -190,55 +203,106 @@ private:
 
   [[gnu::noinline]] KOKKOS_FUNCTION void add(Cell const& cell, int const (&slot)[chunk],
                                              int count) const {
-    Gradients of[chunk];
-    for (int m = 0; m < count; ++m) gradients(cell, slot[m], of[m]);
-    int const np = (cell.count + 7) / 8 * 8;
-    for (int k = 0; k < 3; ++k)
-      for (int l = k; l < 3; ++l) {
-        TM sum[most * padded];
-        for (int i = 0; i < cell.count; ++i)
-          for (int j = 0; j < np; ++j) sum[i * padded + j] = 0;
-        for (int m = 0; m < count; ++m) {
-          TM Kp[3][3];
-          for (int u = 0; u < 3; ++u)
-            for (int v = 0; v < 3; ++v) {
-              Kp[u][v] = TM(number(slot[m], operator_number(k + 3 * u, l + 3 * v)));
-            }
-          Gradients const& own = of[m];
-          for (int i = 0; i < cell.count; ++i) {
-            TM y[3];
-            for (int v = 0; v < 3; ++v) {
-              y[v] = own.w[0][i] * Kp[0][v] + own.w[1][i] * Kp[1][v] + own.w[2][i] * Kp[2][v];
-            }
-            TM* const to = sum + i * padded;
-            for (int j = 0; j < np; j += 8)
-              for (int e = 0; e < 8; ++e) {
-                to[j + e] +=
-                    y[0] * own.w[0][j + e] + y[1] * own.w[1][j + e] + y[2] * own.w[2][j + e];
-              }
-          }
-        }
-        flush(cell, sum, k, l);
+    Seen seen[chunk];
+    for (int m = 0; m < count; ++m) {
+      gradients(cell, slot[m], seen[m]);
+      for (int q = 0; q < 9; ++q) {
+        for (int p = 0; p < 9; ++p)
+          seen[m].stiffness[q][p] = TM(number(slot[m], operator_number(q, p)));
+        for (int p = 9; p < whole(9); ++p) seen[m].stiffness[q][p] = 0;
       }
-  }
-
-  KOKKOS_FUNCTION void flush(Cell const& cell, TM const* sum, int k, int l) const {
+    }
     int const across = cell.n[1] * cell.n[2];
     for (int i = 0; i < cell.count; ++i) {
       int const row = cell.row[i];
       if (row < 0) continue;
       int const x = i / across, y = i / cell.n[2] % cell.n[1], z = i % cell.n[2];
-      int j = 0;
-      for (int a = 0; a < cell.n[0]; ++a)
-        for (int b = 0; b < cell.n[1]; ++b) {
-          int const place = Row::place(a - x, b - y, -z, 0, 0);
-          for (int c = 0; c < cell.n[2]; ++c, ++j) {
-            matrix.entry(row, place + 3 * c + k * Row::padded + l) += sum[i * padded + j];
-            if (k != l) {
-              matrix.entry(row, place + 3 * c + l * Row::padded + k) += sum[j * padded + i];
-            }
-          }
+      int const line = half ? cell.n[1] * x + y : 0;
+      bring_near(cell, row, x, y, line);
+      TM sum[9][padded];
+      add_row(seen, count, i, line * cell.n[2], cell.count, sum);
+      flush(cell, row, x, y, z, line, sum);
+    }
+  }
+
+  /// sum[3 k + l][j] for the nodes j from `begin` on.
+  KOKKOS_FORCEINLINE_FUNCTION void add_row(Seen const (&seen)[chunk], int count, int i, int begin,
+                                           int end, TM (&sum)[9][padded]) const {
+    TM y[chunk][3][whole(9)];
+    for (int m = 0; m < count; ++m) {
+      Pack const g[3] = {Pack(seen[m].w[0][i]), Pack(seen[m].w[1][i]), Pack(seen[m].w[2][i])};
+      for (int k = 0; k < 3; ++k)
+        for (int q = 0; q < whole(9); q += width) {
+          store(Pack(g[0] * load<Pack>(&seen[m].stiffness[k][q]) +
+                     g[1] * load<Pack>(&seen[m].stiffness[k + 3][q]) +
+                     g[2] * load<Pack>(&seen[m].stiffness[k + 6][q])),
+                &y[m][k][q]);
         }
+    }
+    for (int j = begin / width * width; j < end; j += width) {
+      Pack own[9];
+      for (Pack& s : own) s = Pack(TM(0));
+      for (int m = 0; m < count; ++m)
+        for (int v = 0; v < 3; ++v) {
+          Pack const w = load<Pack>(&seen[m].w[v][j]);
+          for (int k = 0; k < 3; ++k)
+            for (int l = 0; l < 3; ++l)
+              own[3 * k + l] = own[3 * k + l] + Pack(y[m][k][3 * v + l]) * w;
+        }
+      for (int kl = 0; kl < 9; ++kl) store(own[kl], &sum[kl][j]);
+    }
+  }
+
+  /// What `flush` is going to add to, while there is something else to do.
+  KOKKOS_FORCEINLINE_FUNCTION void bring_near(Cell const& cell, int row, int x, int y,
+                                              int line) const {
+    for (; line < cell.n[0] * cell.n[1]; ++line) {
+      prefetch_run(matrix, row, Row::place(line / cell.n[1] - x, line % cell.n[1] - y, -R, 0, 0));
+    }
+  }
+  KOKKOS_FORCEINLINE_FUNCTION void flush(Cell const& cell, int row, int x, int y, int z, int line,
+                                         TM const (&sum)[9][padded]) const {
+    int const nz = factor == 1 ? K::width : cell.n[2];
+    for (; line < cell.n[0] * cell.n[1]; ++line) {
+      int const place = Row::place(line / cell.n[1] - x, line % cell.n[1] - y, -z, 0, 0);
+      for (int k = 0; k < 3; ++k)
+        for (int c = 0; c < nz; ++c)
+          for (int l = 0; l < 3; ++l) {
+            matrix.entry(row, place + k * Row::padded + 3 * c + l) += sum[3 * k + l][line * nz + c];
+          }
+    }
+  }
+};
+
+/// Row i in the lines of nodes before its own, from the rows of the nodes there.
+template <class S, class TM, int R>
+struct MirrorRow {
+  GridMatrix<S, TM, R> matrix;
+  KOKKOS_FUNCTION void operator()(int i) const {
+    using Row = StencilRow<R>;
+    auto const& nodes = matrix.nodes;
+    int const leaf = nodes.leaf(i), at[3] = {nodes.ijk(i, 0), nodes.ijk(i, 1), nodes.ijk(i, 2)};
+    for (int run = 0; run < Row::runs / 2; ++run) {
+      int const dx = run / Row::width - R, dy = run % Row::width - R;
+      int next = -1;
+      TM own[3][Row::padded] = {};
+      for (int dz = -R; dz <= R; ++dz) {
+        int const j = nodes.near(leaf, at[0] + dx, at[1] + dy, at[2] + dz);
+        if (j < 0) continue;
+        next = j + 1;
+        for (int c = 0; c < 3; ++c)
+          for (int r = 0; r < 3; ++r) {
+            own[r][3 * (dz + R) + c] = matrix.entry(j, Row::place(-dx, -dy, -dz, c, r));
+          }
+      }
+      // The next row along z is mostly what is wanted next.
+      if (next >= 0 && next < nodes.count) {
+        prefetch_run(matrix, next, Row::place(-dx, -dy, -R, 0, 0));
+      }
+      int const first = Row::place(dx, dy, -R, 0, 0);
+      for (int r = 0; r < 3; ++r)
+        for (int k = 0; k < Row::padded; ++k)
+          matrix.entry(i, first + r * Row::padded + k) = own[r][k];
     }
   }
 };

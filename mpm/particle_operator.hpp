@@ -64,7 +64,8 @@ public:
   template <class Embedding, class TM, int R>
   void coarse_matrix(GridMatrix<S, TM, R> const& coarse) const {
     set_zero(coarse);
-    add_particles<Embedding>(coarse, {});
+    add_particles<Embedding>(coarse, {}, true);
+    mirror(coarse);
     for_each<S>("add_coarse_blocks", coarse.size(),
                 kernels::AddCoarseBlocks<S, Embedding, T, TM, R>{nodes_, fixed_, local_, coarse});
   }
@@ -72,15 +73,15 @@ public:
   template <class TM, int R>
   void matrix(GridMatrix<S, TM, R> const& matrix) const {
     set_zero(matrix);
-    add_rows(matrix, {});
+    add_particles<NoEmbedding>(matrix, {}, true);
+    mirror(matrix);
+    add_local(matrix, {});
   }
-  /// Adds the rows of A of the nodes for which `row_of` is not negative to these rows of `matrix`;
-  /// where it is empty, all.
+  /// Adds the rows of A of the nodes for which `row_of` is not negative to these rows of `matrix`.
   template <class TM, int R>
   void add_rows(GridMatrix<S, TM, R> const& matrix, List<int const> const& row_of) const {
-    add_particles<NoEmbedding>(matrix, row_of);
-    for_each<S>("add_node_blocks", nodes_.count,
-                kernels::AddNodeBlocks<S, T, TM, R>{local_, row_of, matrix});
+    add_particles<NoEmbedding>(matrix, row_of, false);
+    add_local(matrix, row_of);
   }
   /// Bytes held.
   std::size_t memory() const { return (numbers_.span() + partial_.span()) * sizeof(T); }
@@ -90,14 +91,24 @@ private:
   void run(char const* name, Kernel const& kernel) const {
     for_each_team<S>(name, blocks_.patches, team_size_, kernel.scratch_bytes(), kernel);
   }
+  template <class TM, int R>
+  void add_local(GridMatrix<S, TM, R> const& matrix, List<int const> const& row_of) const {
+    for_each<S>("add_node_blocks", nodes_.count,
+                kernels::AddNodeBlocks<S, T, TM, R>{local_, row_of, matrix});
+  }
+  template <class TM, int R>
+  static void mirror(GridMatrix<S, TM, R> const& matrix) {
+    for_each<S>("mirror_rows", matrix.size(), kernels::MirrorRow<S, TM, R>{matrix});
+  }
   template <class Embedding, class TM, int R>
-  void add_particles(GridMatrix<S, TM, R> const& matrix, List<int const> const& row_of) const {
+  void add_particles(GridMatrix<S, TM, R> const& matrix, List<int const> const& row_of,
+                     bool half) const {
     BlockColours<K, S> const colours(blocks_);
     for (int c = 0; c < colours.colours; ++c) {
       for_each<S>(
           "assemble_cells", colours.size(c),
           kernels::AssembleCells<S, T, K, Embedding, TM, R>{
-              blocks_, numbers_, fixed_, colours.order(), colours.begin(c), matrix, row_of});
+              blocks_, numbers_, fixed_, colours.order(), colours.begin(c), matrix, row_of, half});
     }
   }
 

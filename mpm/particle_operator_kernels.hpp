@@ -125,9 +125,21 @@ struct OperatorProduct : OperatorSweep<S, T_, K, packed> {
           f.a[q] = f.a[q] + k * G.a[r];
           if (r != q) f.a[r] = f.a[r] + k * G.a[q];
         }
+      // f grad w of a node, axis by axis: slopes along z apart from the others.
+      T x[3][3], xy[3], xy_z[3];
       auto const received = [&](int a, int b, int c, T(&row)[3]) __attribute__((always_inline)) {
-        Vec3<T> const fi = f * at.gradient(a, b, c);
-        for (int k = 0; k < 3; ++k) row[k] = fi[k];
+        for (int k = 0; k < 3; ++k) {
+          if (b == 0 && c == 0) {
+            x[0][k] = at.d[0][a] * f(k, 0);
+            x[1][k] = at.w[0][a] * f(k, 1);
+            x[2][k] = at.w[0][a] * f(k, 2);
+          }
+          if (c == 0) {
+            xy[k] = at.w[1][b] * x[0][k] + at.d[1][b] * x[1][k];
+            xy_z[k] = at.w[1][b] * x[2][k];
+          }
+          row[k] = at.w[2][c] * xy[k] + at.d[2][c] * xy_z[k];
+        }
       };
       this->template give<3>(team, active, corner, rows.data(), received);
     };
@@ -156,19 +168,31 @@ struct OperatorDiagonal : OperatorSweep<S, T_, K, packed> {
     auto const body = [&](int g, bool active) __attribute__((always_inline)) {
       T_ const* const own = this->group(patch, g);
       Weights<K, T> const at = this->weights(own);
+      // Sum_uv K_uv (grad w)_u (grad w)_v of a node, axis by axis, for each of the six pairs of
+      // components: x_uv, of which those with as many slopes along z are added up along y.
+      constexpr int first[6] = {0, 1, 2, 0, 1, 0}, second[6] = {0, 1, 2, 1, 2, 2};
+      T x[6][6], xy[6][3];
       auto const received = [&](int a, int b, int c, T(&row)[6]) __attribute__((always_inline)) {
-        Vec3<T> const w = at.gradient(a, b, c);
-        constexpr int first[6] = {0, 1, 2, 0, 1, 0}, second[6] = {0, 1, 2, 1, 2, 2};
         for (int k = 0; k < 6; ++k) {
-          row[k] = T(0);
-          for (int u = 0; u < 3; ++u) {
-            T sum(0);
-            for (int v = 0; v < 3; ++v) {
-              int const number = operator_number(first[k] + 3 * u, second[k] + 3 * v);
-              sum = sum + this->number(own, number) * w[v];
+          if (b == 0 && c == 0) {
+            for (int uv = 0; uv < 6; ++uv) {
+              int const u = first[uv], v = second[uv];
+              T sum = this->number(own, operator_number(first[k] + 3 * u, second[k] + 3 * v));
+              if (u != v) {
+                sum = sum + this->number(own, operator_number(first[k] + 3 * v, second[k] + 3 * u));
+              }
+              x[k][uv] =
+                  (u == 0 ? at.d[0][a] : at.w[0][a]) * (v == 0 ? at.d[0][a] : at.w[0][a]) * sum;
             }
-            row[k] = row[k] + sum * w[u];
           }
+          if (c == 0) {
+            T const w = at.w[1][b], d = at.d[1][b];
+            xy[k][0] = w * (w * x[k][0] + d * x[k][3]) + d * d * x[k][1];
+            xy[k][1] = w * (w * x[k][5] + d * x[k][4]);
+            xy[k][2] = w * w * x[k][2];
+          }
+          T const w = at.w[2][c], d = at.d[2][c];
+          row[k] = w * (w * xy[k][0] + d * xy[k][1]) + d * d * xy[k][2];
         }
       };
       this->template give<6>(team, active, corners + g * Base::width, rows.data(), received);

@@ -38,24 +38,51 @@ struct RelaxNode {
   }
 };
 
-/// x_i -= D^-1 sum_j A_ij x_j, with the own block not in the sum.
+/// t_i = b_i less what is before, x_i = D^-1 (t_i less what is after).
 template <class S, class T>
-struct ReduceNode {
+struct RelaxForward {
   BlockField<T, S> inverse;
-  VectorField<T, S> x;
-  KOKKOS_FORCEINLINE_FUNCTION Vec3<T> operator()(int i, Vec3<T> const&, Vec3<T> const& sum) const {
-    Vec3<T> const value = vector_of<T>(x, i) - block_times(inverse, i, sum);
+  VectorField<T, S> b, t, x;
+  KOKKOS_FORCEINLINE_FUNCTION Vec3<T> operator()(int i, Vec3<T> const& before,
+                                                 Vec3<T> const& after) const {
+    Vec3<T> const left = vector_of<T>(b, i) - before;
+    set_vector(t, i, left);
+    Vec3<T> const value = block_times(inverse, i, left - after);
     set_vector(x, i, value);
     return value;
   }
 };
 
-/// r_i = -sum_j A_ij x_j over some of the nodes.
+/// The sweep back, from x with D x = t where nothing is after it: with t, x_i = D^-1 (t_i - sum_j
+/// A_ij x_j), without, x_i -= D^-1 sum_j A_ij x_j; d_i = what x_i was less what it is.
 template <class S, class T>
-struct StoreNegative {
-  VectorField<T, S> x, r;
+struct RelaxBack {
+  BlockField<T, S> inverse;
+  VectorField<T, S> t, x, d;
+  bool with_t;
   KOKKOS_FORCEINLINE_FUNCTION Vec3<T> operator()(int i, Vec3<T> const&, Vec3<T> const& sum) const {
-    set_vector(r, i, -sum);
+    Vec3<T> const was = vector_of<T>(x, i);
+    Vec3<T> less, value;
+    if (with_t) {
+      value = block_times(inverse, i, vector_of<T>(t, i) - sum);
+      less = was - value;
+    } else {
+      less = block_times(inverse, i, sum);
+      value = was - less;
+    }
+    set_vector(x, i, value);
+    set_vector(d, i, less);
+    return value;
+  }
+};
+
+/// r_i = sign sum_j A_ij x_j over some of the nodes.
+template <class S, class T>
+struct StoreSum {
+  VectorField<T, S> x, r;
+  T sign;
+  KOKKOS_FORCEINLINE_FUNCTION Vec3<T> operator()(int i, Vec3<T> const&, Vec3<T> const& sum) const {
+    set_vector(r, i, sign * sum);
     return vector_of<T>(x, i);
   }
 };
@@ -141,7 +168,7 @@ struct ForwardBackward {
                  kernels::SolveNode<S, T>{a.inverse(), v.b, v.x}, known, true, backward);
     // (D + L) x = b leaves the residual -U x, and (D + U) x = b leaves -L x.
     Part const missed = backward ? Part::before : Part::after;
-    sweep_blocks("gauss_seidel_missed", a.matrix(), v.x, kernels::StoreNegative<S, T>{v.x, v.r},
+    sweep_blocks("gauss_seidel_missed", a.matrix(), v.x, kernels::StoreSum<S, T>{v.x, v.r, T(-1)},
                  missed, false, !backward);
   }
   template <class S, class T, int radius>
@@ -155,7 +182,11 @@ private:
   Params params_;
 };
 
-/// Symmetric block Gauss-Seidel, (D + L) D^-1 (D + U), as HOT has it.
+/// Symmetric block Gauss-Seidel, (D + L) D^-1 (D + U), as HOT has it, in three halves of the matrix
+/// on the way down and three on the way up: a sweep forward leaves t = b - L x, the one back takes
+/// (D + U) x' = t, and what is left then is
+///
+///   b - (D + L + U) x' = L (x - x').
 struct SymmetricGaussSeidel {
   static constexpr char const* name = "symmetric_gauss_seidel";
   struct Params {
@@ -169,31 +200,31 @@ struct SymmetricGaussSeidel {
 
   template <class S, class T, int radius>
   void first(MatrixLevel<S, T, radius> const& a, LevelVectors<T, S> const& v) const {
-    sweep(a, v.b, v.x);
-    for (int k = 1; k < params_.sweeps; ++k) second_once(a, v);
-    a.residual(v.b, v.x, v.r);
+    using kernels::Part;
+    sweep_blocks("gauss_seidel_first", a.matrix(), v.x,
+                 kernels::SolveNode<S, T>{a.inverse(), v.b, v.x}, Part::before, true, false);
+    back(a, v, false);
+    for (int k = 1; k < params_.sweeps; ++k) again(a, v);
+    sweep_blocks("gauss_seidel_missed", a.matrix(), v.d, kernels::StoreSum<S, T>{v.d, v.r, T(1)},
+                 Part::before, false, false);
   }
   template <class S, class T, int radius>
   void second(MatrixLevel<S, T, radius> const& a, LevelVectors<T, S> const& v) const {
-    for (int k = 0; k < params_.sweeps; ++k) second_once(a, v);
+    for (int k = 0; k < params_.sweeps; ++k) again(a, v);
   }
 
 private:
   template <class S, class T, int radius>
-  void second_once(MatrixLevel<S, T, radius> const& a, LevelVectors<T, S> const& v) const {
-    a.residual(v.b, v.x, v.r);
-    sweep(a, v.r, v.d);
-    for_each<S>("gauss_seidel_add", a.size(), kernels::AddVectors<S, T>{v.d, v.x});
+  static void again(MatrixLevel<S, T, radius> const& a, LevelVectors<T, S> const& v) {
+    relax_blocks("gauss_seidel_forward", a.matrix(), v.x,
+                 kernels::RelaxForward<S, T>{a.inverse(), v.b, v.y, v.x});
+    back(a, v, true);
   }
-  /// x = (D + U)^-1 D (D + L)^-1 b
   template <class S, class T, int radius>
-  static void sweep(MatrixLevel<S, T, radius> const& a, VectorField<T, S> const& b,
-                    VectorField<T, S> const& x) {
-    using kernels::Part;
-    sweep_blocks("gauss_seidel_forward", a.matrix(), x, kernels::SolveNode<S, T>{a.inverse(), b, x},
-                 Part::before, true, false);
-    sweep_blocks("gauss_seidel_back", a.matrix(), x, kernels::ReduceNode<S, T>{a.inverse(), x},
-                 Part::after, true, true);
+  static void back(MatrixLevel<S, T, radius> const& a, LevelVectors<T, S> const& v, bool with_t) {
+    sweep_blocks("gauss_seidel_back", a.matrix(), v.x,
+                 kernels::RelaxBack<S, T>{a.inverse(), v.y, v.x, v.d, with_t}, kernels::Part::after,
+                 true, true);
   }
 
   Params params_;

@@ -18,6 +18,7 @@ namespace kernels {
 /// A register of W numbers as the compiler's vectors, seen as W / 4 quads.
 template <class Real, int W>
 struct Quads {
+  static constexpr bool wide = sizeof(Real) == 8;
   typedef Real Vector __attribute__((vector_size(W * sizeof(Real))));
   typedef Real Quad __attribute__((vector_size(4 * sizeof(Real))));
   union Split {
@@ -27,8 +28,13 @@ struct Quads {
 
   template <bool high, int... k>
   static Vector interleave(Vector a, Vector b, std::integer_sequence<int, k...>) {
-    // Per quad: a0 b0 a1 b1, or a2 b2 a3 b3.
-    return __builtin_shufflevector(a, b, (k / 4 * 4 + 2 * high + k % 4 / 2 + k % 2 * W)...);
+    // Per quad: a0 b0 a2 b2, or a1 b1 a3 b3 where halves of a quad are as wide as what an
+    // instruction interleaves; else a0 b0 a1 b1, or a2 b2 a3 b3.
+    if constexpr (wide) {
+      return __builtin_shufflevector(a, b, (k / 2 * 2 + high + k % 2 * W)...);
+    } else {
+      return __builtin_shufflevector(a, b, (k / 4 * 4 + 2 * high + k % 4 / 2 + k % 2 * W)...);
+    }
   }
   template <bool high, int... k>
   static Vector join(Vector a, Vector b, std::integer_sequence<int, k...>) {
@@ -60,8 +66,8 @@ struct Quads {
     Vector const c = half ? v[2] : interleave<false>(v[2], v[3], lanes);
     Vector const d = half ? v[3] : interleave<true>(v[2], v[3], lanes);
     v[0] = join<false>(a, c, lanes);
-    v[1] = join<true>(a, c, lanes);
-    v[2] = join<false>(b, d, lanes);
+    v[wide ? 2 : 1] = join<true>(a, c, lanes);
+    v[wide ? 1 : 2] = join<false>(b, d, lanes);
     v[3] = join<true>(b, d, lanes);
   }
 };
