@@ -216,10 +216,8 @@ private:
     }
     if (method_ == "lbfgs_h") return HessianByPcg::Params{};
     if (multigrid()) {
-      // Where the largest eigenvalue is underestimated Chebyshev's polynomial, and the cycle with
-      // it, is indefinite: eight steps of Lanczos were too few for stiff rings that begin to touch.
       return Cycle::Params{.refresh = refresh_of(options_, Refresh::lagged(8)),
-                           .cycle = {.visits = visits(), .fine = {.safety = 1.2, .steps = 20}}};
+                           .cycle = {.visits = visits()}};
     }
     Refresh const refresh = refresh_of(options_, {});
     if (name == "block_jacobi") return BlockJacobi<P, S>::Params{.refresh = refresh};
