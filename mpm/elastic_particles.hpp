@@ -11,6 +11,7 @@
 #include <taut/core/report/error.hpp>
 #include <taut/mpm/characteristic_force.hpp>
 #include <taut/mpm/particle_assembly.hpp>
+#include <taut/mpm/particle_split.hpp>
 
 namespace taut {
 
@@ -190,6 +191,33 @@ public:
     to.resize(blocks_, grid_, team_size_);
     using Kernel_ = kernels::LineariseParticles<Space, Precision, Material, K, packed_>;
     run("particle_linearise", Kernel_{frame(x), static_cast<Real>(scale), to.numbers()});
+  }
+  /// A splitting begins at x (particle_split.hpp), with `stiffness` times |d2Psi/dF2 (I)| / 3 of
+  /// each material, which is near Young's modulus, between F and what stands for it: `state` is
+  /// made, and `to` the Hessian of the split function.
+  template <class Operator>
+  void start_split(Positions const& x, double stiffness, double scale,
+                   SplitParticleState<Real, Space>& state, Operator& to) const {
+    to.resize(blocks_, grid_, team_size_);
+    grow(state.numbers, "split_numbers",
+         data_.extent(0) / kernels::point_numbers * std::size_t(kernels::split_numbers));
+    grow(state.stiffness, "split_stiffness", norms_.extent(0));
+    for_each<Space>("split_stiffness", static_cast<int>(norms_.extent(0)),
+                    kernels::ScaleNorms<Space>{norms_, state.stiffness, stiffness / 3});
+    using Kernel_ = kernels::LineariseSplit<Space, Precision, Material, K, packed_>;
+    run("split_linearise",
+        Kernel_{frame(x), state.stiffness, static_cast<Real>(scale), to.numbers()});
+  }
+  /// Brings `state` up to x, and takes the gradient g of the potential to that of the split
+  /// function.
+  void split(Positions const& x, double scale, double relaxation, bool first,
+             FixedMask<Space> const& fixed, SplitParticleState<Real, Space> const& state,
+             Vectors const& g) const {
+    provide_partial(fixed, 3);
+    using Kernel_ = kernels::SplitParticles<Space, Precision, Material, K, packed_>;
+    run("particle_split", Kernel_{frame(x), state.stiffness, static_cast<Real>(scale),
+                                  static_cast<Real>(relaxation), first, state.numbers, partial_});
+    gather<3>({{}, fixed, g, {}, {}});
   }
   /// Block by block and colour after colour; a block matrix of 125 (343) columns a row.
   void add_to(Matrix const& matrix, Positions const& x, double scale,

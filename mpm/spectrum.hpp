@@ -110,7 +110,7 @@ concept PreconditionedLevel = LevelOperator<A> &&
 
 /// The largest eigenvalue of D^-1 A, from below. Uses the vectors r, d and y.
 template <LevelOperator A, class T, class S>
-double largest_eigenvalue(A const& a, LevelVectors<T, S> const& v, int steps = 8) {
+double largest_eigenvalue(A const& a, LevelVectors<T, S> const& v, int steps = 20) {
   int const n = a.size();
   if (n == 0) return 1;
   Reducer<S> const reducer(n, 1);

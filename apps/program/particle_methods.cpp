@@ -1,6 +1,7 @@
 #include <taut/apps/program/option_policies.hpp>
 #include <taut/apps/program/particle_methods.hpp>
 #include <taut/core/report/error.hpp>
+#include <taut/integrators/admm.hpp>
 #include <taut/integrators/any_preconditioner.hpp>
 #include <taut/integrators/inverse_by_pcg.hpp>
 #include <taut/integrators/lbfgs.hpp>
@@ -9,6 +10,7 @@
 #include <taut/mpm/any_smoother.hpp>
 #include <taut/mpm/particle_hessian.hpp>
 #include <taut/mpm/particle_multigrid.hpp>
+#include <taut/mpm/particle_splitting.hpp>
 
 #include <array>
 
@@ -105,6 +107,14 @@ public:
       params.lbfgs.newton_first_step = !hot;
       params.lbfgs.forget_when_renewed = options_.flag("forget");
       return hold<Minimiser>(params, window());
+    }
+    if (method_ == "admm") {
+      using Minimiser = Admm<ParticleSplitting<P, S>, ParticleStopping, P, S>;
+      Minimiser::Params params;
+      params.stop = stopping(8);
+      params.budget.max_iterations = options_.integer("max_iterations");
+      params.copies.cycle.visits = visits();
+      return std::make_unique<Holder<Minimiser>>(params);
     }
     if (method_ == "chebyshev") {
       throw Error(
@@ -216,10 +226,8 @@ private:
     }
     if (method_ == "lbfgs_h") return HessianByPcg::Params{};
     if (multigrid()) {
-      // Where the largest eigenvalue is underestimated Chebyshev's polynomial, and the cycle with
-      // it, is indefinite: eight steps of Lanczos were too few for stiff rings that begin to touch.
       return Cycle::Params{.refresh = refresh_of(options_, Refresh::lagged(8)),
-                           .cycle = {.visits = visits(), .fine = {.safety = 1.2, .steps = 20}}};
+                           .cycle = {.visits = visits()}};
     }
     Refresh const refresh = refresh_of(options_, {});
     if (name == "block_jacobi") return BlockJacobi<P, S>::Params{.refresh = refresh};
@@ -289,7 +297,8 @@ std::span<MethodTitle const> particle_method_titles() {
       MethodTitle{"pn_sgspcg", "PN-SGS-PCG", "the same with symmetric Gauss-Seidel"},
       MethodTitle{"pn_mgpcg", "PN-MGPCG", "projected Newton, PCG with HOT's cycle"},
       MethodTitle{"pn_gmgpcg", "PN-GMG-PCG", "projected Newton, PCG with the cycle of lbfgs_gmg"},
-      MethodTitle{"gast15", "Gast15", "projected Newton of Gast et al. 2015, without a matrix"}};
+      MethodTitle{"gast15", "Gast15", "projected Newton of Gast et al. 2015, without a matrix"},
+      MethodTitle{"admm", "ADMM", "alternating directions, particles' own gradients (Fang 2019)"}};
   return titles;
 }
 

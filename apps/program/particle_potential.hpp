@@ -8,6 +8,7 @@
 #include <taut/materials/elastic.hpp>
 #include <taut/mpm/particle_grid.hpp>
 #include <taut/mpm/particle_operator.hpp>
+#include <taut/mpm/particle_split.hpp>
 #include <taut/mpm/slip.hpp>
 
 #include <algorithm>
@@ -31,6 +32,7 @@ public:
   using Points = Particles<ParticlePrecision, DefaultSpace>;
   using GridBlocks = ProgramGrid::Blocks;
   using Operator = ParticleOperator<ParticleKernel, ParticlePrecision::real, DefaultSpace>;
+  using Split = SplitParticleState<ParticlePrecision::real, DefaultSpace>;
 
   template <class Term>
   void add(Term term) {
@@ -41,6 +43,13 @@ public:
                            Positions const& rest) { held->update(particles, blocks, grid, rest); });
     linearised_.push_back(
         [held](Positions const& x, double scale, Operator& to) { held->linearise(x, scale, to); });
+    split_.push_back(
+        {[held](Positions const& x, double stiffness, double scale, Split& state, Operator& to) {
+           held->start_split(x, stiffness, scale, state, to);
+         },
+         [held](Positions const& x, double scale, double relaxation, bool first,
+                FixedMask<DefaultSpace> const& fixed, Split const& state,
+                Vectors const& g) { held->split(x, scale, relaxation, first, fixed, state, g); }});
     measured_.push_back([held](Array<double, DefaultSpace> const& force) {
       held->add_characteristic_force(force);
     });
@@ -63,6 +72,19 @@ public:
     }
     linearised_.front()(x, scale, to);
   }
+  /// For ADMM (mpm/particle_split.hpp). Throws Error unless one term holds all.
+  void start_split(Positions const& x, double stiffness, double scale, Split& state,
+                   Operator& to) const {
+    if (split_.size() != 1) {
+      throw Error("{} models over the particles cannot be split as one: choose another method",
+                  split_.size());
+    }
+    split_.front().start(x, stiffness, scale, state, to);
+  }
+  void split(Positions const& x, double scale, double relaxation, bool first,
+             FixedMask<DefaultSpace> const& fixed, Split const& state, Vectors const& g) const {
+    split_.front().update(x, scale, relaxation, first, fixed, state, g);
+  }
   void add_characteristic_force(Array<double, DefaultSpace> const& force) const {
     for (auto const& add : measured_) add(force);
   }
@@ -74,6 +96,13 @@ private:
                                  Positions const&)>>
       told_;
   std::vector<std::function<void(Positions const&, double, Operator&)>> linearised_;
+  struct SplitTerm {
+    std::function<void(Positions const&, double, double, Split&, Operator&)> start;
+    std::function<void(Positions const&, double, double, bool, FixedMask<DefaultSpace> const&,
+                       Split const&, Vectors const&)>
+        update;
+  };
+  std::vector<SplitTerm> split_;
   std::vector<std::function<void(Array<double, DefaultSpace> const&)>> measured_;
 };
 

@@ -15,7 +15,7 @@ std::span<OptionKey const> solver_keys() {
         "newton",    "gradient",  "hot",         "hot_quadratic",
         "lbfgs_h",   "lbfgs_gmg", "lbfgs_plain", "pn_pcg",
         "pn_pcg_mf", "pn_sgspcg", "pn_mgpcg",    "pn_gmgpcg",
-        "gast15"},
+        "gast15",    "admm"},
        "the minimiser: nonlinear conjugate gradients by its beta, or another one; a scene of "
        "material points that does not say takes lbfgs"},
       {"precision",

@@ -152,6 +152,58 @@ TEST_CASE("a cycle without a fine matrix is that of the matrix", "[mpm][operator
   CHECK(apart(by_action, by_matrix, l.n) < 1e-11);
 }
 
+TEST_CASE("the polynomial that smooths is positive where two grains are stiffer than all else",
+          "[mpm][operator]") {
+  using C = Of<Fp64, test::Right<DefaultSpace>, true>;
+  using S = C::Space;
+  double const dx = 0.05, step = 1.0 / 24;
+  auto list = test::jittered_block(6, 2, dx, {-3.3, 5.2, 6.6}, 1, 0.0);
+  for (int const grain : {6 * 144 + 6 * 12 + 6, 7 * 144 + 6 * 12 + 6}) list[grain].stiffness = 100;
+  test::OnGrid<QuadraticSpline, Fp64, S> scene(list, dx, C::Term::lanes);
+  C::Term term({lame_parameters(5e5, 0.4)});
+  term.update(scene.particles, scene.blocks, scene.grid.nodes(), scene.rest);
+  Linearised<C>::Operator to;
+  term.linearise(scene.rest, step * step, to);
+  int const n = scene.nodes();
+  BlockField<double, S> const local("local", n);
+  for (int i = 0; i < n; ++i)
+    for (int c = 0; c < 3; ++c) local(i, c) = 1000 * dx * dx * dx;
+  to.set_local(local, FixedMask<S>("fixed", n));
+  using Action = ActionLevel<Linearised<C>::Operator, S, double>;
+  Action level;
+  level.resize(to.nodes(), to.fixed(), to);
+  level.finish();
+
+  LevelVectors<double, S> v;
+  v.resize(n);
+  double const largest = largest_by_power(level, v, 400, 0);
+  VectorField<double, S> const e("e", n), r("r", n), z("z", n);
+  assign(e, Kokkos::subview(v.d, Kokkos::make_pair(0, n), Kokkos::ALL));
+  level.product(e, r);
+  // e'A S A e / e'A e of the smoother's pair S alone, in the stiffest direction.
+  auto const positive = [&](Chebyshev::Params const& params) {
+    Multigrid<Action, Chebyshev, ForwardBackward, LinearEmbedding, double> smoothing(
+        {.max_levels = 1, .direct_nodes = 0, .fine = params});
+    smoothing.build(level);
+    REQUIRE(smoothing.report().nodes.size() == 1);
+    smoothing.apply(r, z);
+    double above = 0, below = 0;
+    for (int i = 0; i < n; ++i)
+      for (int c = 0; c < 3; ++c) {
+        above += r(i, c) * z(i, c);
+        below += r(i, c) * e(i, c);
+      }
+    return above / below;
+  };
+  Chebyshev by_default;
+  by_default.setup(level, v);
+  CHECK(by_default.largest() > largest);
+  CHECK(by_default.largest() < 1.25 * largest);
+  CHECK(positive({}) > 0.1);
+  // What this is to catch: so short a look is indefinite here.
+  CHECK(positive({.safety = 1.1, .steps = 8}) < -0.1);
+}
+
 TEST_CASE("cut cells are solved with by patches", "[mpm][operator]") {
   using C = Of<Fp64, test::Right<DefaultSpace>, true>;
   using S = C::Space;

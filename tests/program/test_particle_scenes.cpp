@@ -210,7 +210,8 @@ TEST_CASE("all methods find the same step", "[particles]") {
        {"solver.method=pn_mgpcg"},
        {"solver.method=pn_mgpcg", "solver.smoother=optimal_jacobi", "solver.flexible=true"},
        {"solver.method=pn_gmgpcg", "solver.coarse_solver=smoother"},
-       {"solver.method=gast15"}}));
+       {"solver.method=gast15"},
+       {"solver.method=admm"}}));
   CAPTURE(other);
   auto const x = step(other);
   double worst = 0;
