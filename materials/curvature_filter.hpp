@@ -7,10 +7,12 @@
 //   quadratic(s, dF) dF : H : dF
 //   at(s)            diagonal(b) and block(b) of many b, for what has more vertices than a tet
 //
-// per unit volume; T may be a pack of elements.
+// per unit volume; T may be a pack of elements. One with `by_edges` gives them of an EdgeState as
+// well, with the place of a corner for b and the change of the edges for dF.
 #pragma once
 
 #include <taut/core/math/psd_projection.hpp>
+#include <taut/materials/edge_state.hpp>
 #include <taut/materials/isotropic.hpp>
 #include <taut/materials/singular_frame.hpp>
 
@@ -24,8 +26,8 @@ KOKKOS_FORCEINLINE_FUNCTION Vec3<T> clamped_diagonal(Sym3<T> const& h) {
 
 /// The state with the negative weights of squares in a vertex block left out. What remains of the
 /// block, but for the term with dPsi/dI1, is positive semi-definite for every model.
-template <class Model, class T>
-KOKKOS_FORCEINLINE_FUNCTION void keep_squares(IsotropicState<Model, T>& s) {
+template <class Model, class T, template <class, class> class State>
+KOKKOS_FORCEINLINE_FUNCTION void keep_squares(State<Model, T>& s) {
   s.d.d2 = max(s.d.d2, T(0));
   if constexpr (Model::use.d11) s.d.d11 = max(s.d.d11, T(0));
   if constexpr (Model::use.d22) s.d.d22 = max(s.d.d22, T(0));
@@ -50,32 +52,30 @@ struct CurvatureAt {
 /// The paper's: each of the twelve diagonal entries and the scalar dF:H:dF are cut off at zero.
 struct ClampElement {
   static constexpr char const* name = "clamp";
+  static constexpr bool by_edges = true;
 
   template <class Model, class T>
   KOKKOS_FORCEINLINE_FUNCTION static CurvatureAt<ClampElement, Model, T> at(
       IsotropicState<Model, T> const& s) {
     return {s};
   }
-  template <class Model, class T>
-  KOKKOS_FORCEINLINE_FUNCTION static Vec3<T> diagonal(IsotropicState<Model, T> const& s,
-                                                      Vec3<T> const& b) {
+  template <class Model, class State, class Corner>
+  KOKKOS_FORCEINLINE_FUNCTION static auto diagonal(State const& s, Corner const& b) {
     return kernels::clamped_diagonal(vertex_block<Model, true>(s, b));
   }
-  template <class Model, class T>
-  KOKKOS_FORCEINLINE_FUNCTION static Sym3<T> block(IsotropicState<Model, T> const& s,
-                                                   Vec3<T> const& b) {
+  template <class Model, class State, class Corner>
+  KOKKOS_FORCEINLINE_FUNCTION static auto block(State const& s, Corner const& b) {
     // Without I1 a vertex block is a sum of squares, which needs no eigenvalues.
     if constexpr (Model::use.d1) {
       return project_psd(vertex_block<Model, false>(s, b));
     } else {
-      IsotropicState<Model, T> positive = s;
+      State positive = s;
       kernels::keep_squares(positive);
       return vertex_block<Model, false>(positive, b);
     }
   }
-  template <class Model, class T>
-  KOKKOS_FORCEINLINE_FUNCTION static T quadratic(IsotropicState<Model, T> const& s,
-                                                 Mat3<T> const& dF) {
+  template <class Model, class State, class T>
+  KOKKOS_FORCEINLINE_FUNCTION static T quadratic(State const& s, Mat3<T> const& dF) {
     return max(quadratic_form<Model>(s, dF), T(0));
   }
 };

@@ -22,6 +22,8 @@ struct Elastic {
 
   static constexpr char const* name = Model::name;
   static constexpr bool allows_inversion = Model::allows_inversion;
+  /// Whether the edges of a tet serve instead of F (edge_state.hpp).
+  static constexpr bool by_edges = !Model::use.d1 && requires { requires Filter::by_edges; };
 
   template <class T>
   KOKKOS_FORCEINLINE_FUNCTION static Parameters<T> cast(Parameters<double> const& p) {
@@ -38,14 +40,22 @@ struct Elastic {
   KOKKOS_FORCEINLINE_FUNCTION static State<T> evaluate(Lame<T> const& p, Mat3<T> const& F) {
     return taut::evaluate<Model>(p, F);
   }
-  /// Makes stress and curvature of the state those of a volume `weight`.
+  /// At the edges D = F B^-1. What is made of the state then takes the place of a corner, 0 to 3,
+  /// for its b, and a change of the edges for dF.
   template <class T>
-  KOKKOS_FORCEINLINE_FUNCTION static void weigh(State<T>& s, T const& weight) {
+  KOKKOS_FORCEINLINE_FUNCTION static EdgeState<Model, T> evaluate_edges(Lame<T> const& p,
+                                                                        Mat3<T> const& B,
+                                                                        Mat3<T> const& D) {
+    return taut::evaluate_edges<Model>(p, B, D);
+  }
+  /// Makes stress and curvature of the state those of a volume `weight`.
+  template <class AnyState, class T>
+  KOKKOS_FORCEINLINE_FUNCTION static void weigh(AnyState& s, T const& weight) {
     s.d = weight * s.d;
   }
   /// Psi(F) - Psi(F - dF) without cancellation.
-  template <class T>
-  KOKKOS_FORCEINLINE_FUNCTION static T change(Lame<T> const& p, State<T> const& s,
+  template <class AnyState, class T>
+  KOKKOS_FORCEINLINE_FUNCTION static T change(Lame<T> const& p, AnyState const& s,
                                               Mat3<T> const& dF) {
     return energy_change<Model>(p, s, dF);
   }
@@ -54,13 +64,18 @@ struct Elastic {
   KOKKOS_FORCEINLINE_FUNCTION static Mat3<T> stress(State<T> const& s) {
     return taut::stress<Model>(s);
   }
-  /// Filtered curvature of a vertex with dF = u b^T: diagonal and 3x3 block.
+  /// P b_a of the corner in place `a` below 3.
   template <class T>
-  KOKKOS_FORCEINLINE_FUNCTION static Vec3<T> diagonal(State<T> const& s, Vec3<T> const& b) {
+  KOKKOS_FORCEINLINE_FUNCTION static Vec3<T> corner_stress(EdgeState<Model, T> const& s, int a) {
+    return taut::corner_stress<Model>(s, a);
+  }
+  /// Filtered curvature of a vertex with dF = u b^T: diagonal and 3x3 block.
+  template <class AnyState, class Corner>
+  KOKKOS_FORCEINLINE_FUNCTION static auto diagonal(AnyState const& s, Corner const& b) {
     return Filter::template diagonal<Model>(s, b);
   }
-  template <class T>
-  KOKKOS_FORCEINLINE_FUNCTION static Sym3<T> block(State<T> const& s, Vec3<T> const& b) {
+  template <class AnyState, class Corner>
+  KOKKOS_FORCEINLINE_FUNCTION static auto block(AnyState const& s, Corner const& b) {
     return Filter::template block<Model>(s, b);
   }
   /// The same of many b: `.diagonal(b)` and `.block(b)`. The state must outlive it.
@@ -69,8 +84,8 @@ struct Elastic {
     return Filter::template at<Model>(s);
   }
   /// Filtered dF : H : dF.
-  template <class T>
-  KOKKOS_FORCEINLINE_FUNCTION static T quadratic(State<T> const& s, Mat3<T> const& dF) {
+  template <class AnyState, class T>
+  KOKKOS_FORCEINLINE_FUNCTION static T quadratic(AnyState const& s, Mat3<T> const& dF) {
     return Filter::template quadratic<Model>(s, dF);
   }
   /// The exactly projected second derivative; `apply(dF)` and `vertex_pair(V^T b_a, V^T b_b)`.

@@ -3,12 +3,13 @@
 //   gradient   W P(F) b_a                       curvature   W b_a' (d2Psi/dF2) b_a
 //   form       W dF : d2Psi/dF2 : dF            product     W dP(F; dF) b_a
 //
-// where b_0, b_1, b_2 are the rows of B and b_3 = -(b_0 + b_1 + b_2): in a patch the corner that
-// edges start from comes last. The loop bodies are inlined by force: called, they would fetch what
-// they capture anew after every store.
+// (see tet_state.hpp), where b_0, b_1, b_2 are the rows of B and b_3 = -(b_0 + b_1 + b_2): in a
+// patch the corner that edges start from comes last. The loop bodies are inlined by force: called,
+// they would fetch what they capture anew after every store.
 #pragma once
 
 #include <taut/core/fem/inversion_sweeps.hpp>
+#include <taut/core/fem/tet_state.hpp>
 
 namespace taut::kernels {
 
@@ -39,28 +40,25 @@ struct GradientSweep : PatchSweep<S, typename Precision::real> {
   /// Hands each corner its gradient and curvature.
   template <Curvature what>
   KOKKOS_FORCEINLINE_FUNCTION void scatter(bool to_vertex, typename Base::Elements const& elements,
-                                           int g, Mat3<T> const& B,
-                                           typename Material::template State<T> const& state,
+                                           int g, TetState<Material, T> const& tet,
                                            Real* slots) const {
-    Mat3<T> const P = Material::stress(state);
-    Vec3<T> rest{T(0), T(0), T(0)};
+    Vec3<T> sum;
 #if defined(__CUDA_ARCH__)
 #pragma unroll
 #elif !defined(__CUDACC__)
 #pragma GCC unroll 4
 #endif
     for (int a = 0; a < 4; ++a) {
-      Vec3<T> const b = shape_gradient(B, a);
-      Vec3<T> const f = a < 3 ? P * b : -rest;
-      rest = rest + f;
+      Vec3<T> const f = a < 3 ? tet.gradient(a) : -sum;
+      sum = a == 0 ? f : sum + f;
       if constexpr (what == Curvature::none) {
         this->template give<3>(to_vertex, elements, g, a, {f[0], f[1], f[2]}, slots);
       } else if constexpr (what == Curvature::diagonal) {
-        Vec3<T> const d = Material::diagonal(state, b);
+        Vec3<T> const d = tet.diagonal(a);
         this->template give<6>(to_vertex, elements, g, a, {f[0], f[1], f[2], d[0], d[1], d[2]},
                                slots);
       } else {
-        Sym3<T> const h = Material::block(state, b);
+        Sym3<T> const h = tet.block(a);
         this->template give<9>(to_vertex, elements, g, a,
                                {f[0], f[1], f[2], h.s[0], h.s[1], h.s[2], h.s[3], h.s[4], h.s[5]},
                                slots);
@@ -69,10 +67,9 @@ struct GradientSweep : PatchSweep<S, typename Precision::real> {
   }
 
   std::size_t scratch_bytes() const {
-    auto const& v = this->patches;
-    return 2 * ScratchField<S, Real>::shmem_size(std::size_t(4) * v.max_locals) +
+    return ScratchField<S, Real>::shmem_size(this->row_numbers()) +
            ScratchField<S, Real>::shmem_size(this->slot_numbers(numbers())) +
-           ScratchField<S, double>::shmem_size(std::size_t(v.max_packs) * Base::per_pack);
+           ScratchField<S, Real>::shmem_size(this->element_numbers());
   }
 
   KOKKOS_FUNCTION void operator()(typename S::team_member const& team) const {
@@ -82,12 +79,11 @@ struct GradientSweep : PatchSweep<S, typename Precision::real> {
       if (after_step) Kokkos::single(Kokkos::PerTeam(team), [&]() { change(patch) = 0; });
       return;
     }
-    ScratchField<S, Real> const local_x(team.team_scratch(0), 4 * v.max_locals);
-    ScratchField<S, Real> const local_p(team.team_scratch(0), after_step ? 4 * v.max_locals : 0);
+    ScratchField<S, Real> const local(team.team_scratch(0), this->row_numbers());
     ScratchField<S, Real> const slots(team.team_scratch(0), this->slot_numbers(numbers()));
-    ScratchField<S, double> const energies(team.team_scratch(0), v.max_packs * Base::per_pack);
-    this->load_relative(team, patch, x, local_x);
-    if (after_step) this->load_relative(team, patch, p, local_p);
+    ScratchField<S, Real> const energies(team.team_scratch(0), this->element_numbers());
+    this->load_relative(team, patch, x, 0, local);
+    if (after_step) this->load_relative(team, patch, p, 1, local);
     if (curvature == Curvature::none) {
       this->template clear<3>(team, patch, slots);
     } else if (curvature == Curvature::diagonal) {
@@ -100,20 +96,25 @@ struct GradientSweep : PatchSweep<S, typename Precision::real> {
     auto const lame = Material::template cast<T>(materials(v.material(patch)));
     auto const elements = this->elements(patch);
     auto const body = [&](int g) __attribute__((always_inline)) {
-      Mat3<T> const B = elements.inverse_rest(g);
-      T const weight = T(scale) * elements.volume(g);
-      auto state = Material::evaluate(lame, elements.edges(g, local_x.data()) * B);
+      Mat3<T> D, d;
       if (after_step) {
-        Mat3<T> const dF = T(alpha) * (elements.apart().edges(g, local_p.data()) * B);
-        energies(g) = sum_lanes(T(weight * Material::change(lame, state, dF)));
-      }
-      Material::weigh(state, weight);
-      if (curvature == Curvature::none) {
-        scatter<Curvature::none>(to_vertex, elements.apart(), g, B, state, slots.data());
-      } else if (curvature == Curvature::diagonal) {
-        scatter<Curvature::diagonal>(to_vertex, elements.apart(), g, B, state, slots.data());
+        elements.edges(g, local.data(), D, d);
       } else {
-        scatter<Curvature::blocks>(to_vertex, elements.apart(), g, B, state, slots.data());
+        D = elements.edges(g, local.data());
+        d = {};
+      }
+      T const weight = T(scale) * elements.volume(g);
+      TetState<Material, T> tet(lame, elements.inverse_rest(g), D);
+      if (after_step) {
+        store(T(weight * tet.change(T(alpha) * d)), energies.data() + g * Base::width);
+      }
+      tet.weigh(weight);
+      if (curvature == Curvature::none) {
+        scatter<Curvature::none>(to_vertex, elements.apart(), g, tet, slots.data());
+      } else if (curvature == Curvature::diagonal) {
+        scatter<Curvature::diagonal>(to_vertex, elements.apart(), g, tet, slots.data());
+      } else {
+        scatter<Curvature::blocks>(to_vertex, elements.apart(), g, tet, slots.data());
       }
     };
     Kokkos::parallel_for(Kokkos::TeamThreadRange(team, this->groups(patch)), body);
@@ -143,18 +144,17 @@ struct ProductSweep : PatchSweep<S, typename Precision::real> {
   SweepOutput<S, Real> output;
 
   std::size_t scratch_bytes() const {
-    return 2 * ScratchField<S, Real>::shmem_size(std::size_t(4) * this->patches.max_locals) +
+    return ScratchField<S, Real>::shmem_size(this->row_numbers()) +
            ScratchField<S, Real>::shmem_size(this->slot_numbers(3));
   }
 
   KOKKOS_FUNCTION void operator()(typename S::team_member const& team) const {
     int const patch = team.league_rank();
     auto const& v = this->patches;
-    ScratchField<S, Real> const local_x(team.team_scratch(0), 4 * v.max_locals);
-    ScratchField<S, Real> const local_p(team.team_scratch(0), 4 * v.max_locals);
+    ScratchField<S, Real> const local(team.team_scratch(0), this->row_numbers());
     ScratchField<S, Real> const slots(team.team_scratch(0), this->slot_numbers(3));
-    this->load_relative(team, patch, x, local_x);
-    this->load_relative(team, patch, p, local_p);
+    this->load_relative(team, patch, x, 0, local);
+    this->load_relative(team, patch, p, 1, local);
     this->template clear<3>(team, patch, slots);
     bool const to_vertex = this->alone(team);
     team.team_barrier();
@@ -162,9 +162,11 @@ struct ProductSweep : PatchSweep<S, typename Precision::real> {
     auto const elements = this->elements(patch);
     auto const body = [&](int g) __attribute__((always_inline)) {
       Mat3<T> const B = elements.inverse_rest(g);
-      auto state = Material::evaluate(lame, elements.edges(g, local_x.data()) * B);
+      Mat3<T> D, d;
+      elements.edges(g, local.data(), D, d);
+      auto state = Material::evaluate(lame, D * B);
       Material::weigh(state, T(scale) * elements.volume(g));
-      Mat3<T> const dP = Material::frame(state).apply(elements.edges(g, local_p.data()) * B);
+      Mat3<T> const dP = Material::frame(state).apply(d * B);
       Vec3<T> rest{T(0), T(0), T(0)};
       for (int a = 0; a < 4; ++a) {
         Vec3<T> const f = a < 3 ? dP * shape_gradient(B, a) : -rest;
@@ -200,9 +202,8 @@ struct MeasureSweep : PatchSweep<S, typename Precision::real> {
   static constexpr bool certifies = measure == Measure::form && !Material::allows_inversion;
 
   std::size_t scratch_bytes() const {
-    auto const& v = this->patches;
-    return 2 * ScratchField<S, Real>::shmem_size(std::size_t(4) * v.max_locals) +
-           ScratchField<S, double>::shmem_size(std::size_t(v.max_packs) * Base::per_pack);
+    return ScratchField<S, Real>::shmem_size(this->row_numbers()) +
+           ScratchField<S, Real>::shmem_size(this->element_numbers());
   }
 
   KOKKOS_FUNCTION void operator()(typename S::team_member const& team) const {
@@ -215,38 +216,36 @@ struct MeasureSweep : PatchSweep<S, typename Precision::real> {
       });
       return;
     }
-    ScratchField<S, Real> const local_x(team.team_scratch(0), 4 * v.max_locals);
-    ScratchField<S, Real> const local_p(team.team_scratch(0), 4 * v.max_locals);
-    ScratchField<S, double> const energies(team.team_scratch(0), v.max_packs * Base::per_pack);
-    this->load_relative(team, patch, x, local_x);
-    if constexpr (measure != Measure::energy) this->load_relative(team, patch, p, local_p);
+    ScratchField<S, Real> const local(team.team_scratch(0), this->row_numbers());
+    ScratchField<S, Real> const energies(team.team_scratch(0), this->element_numbers());
+    [[maybe_unused]] Real largest_x = 0, largest_p = 0;
+    largest_x = this->template load_relative<certifies>(team, patch, x, 0, local);
+    if constexpr (measure != Measure::energy)
+      largest_p = this->template load_relative<certifies>(team, patch, p, 1, local);
     team.team_barrier();
     auto const lame = Material::template cast<T>(materials(v.material(patch)));
     auto const elements = this->elements(patch);
-    [[maybe_unused]] InversionCertificate<T> const certificate(
-        certifies ? this->largest(team, patch, local_x) : Real(0),
-        certifies ? this->largest(team, patch, local_p) : Real(0));
+    [[maybe_unused]] InversionCertificate<T> const certificate(largest_x, largest_p);
     [[maybe_unused]] T square_length(Kokkos::Experimental::finite_max_v<Real>);
     auto const body = [&](int g) __attribute__((always_inline)) {
       Mat3<T> const B = elements.inverse_rest(g);
-      Mat3<T> F = elements.edges(g, local_x.data()) * B;
       T density;
       if constexpr (measure == Measure::energy) {
-        density = Material::energy(lame, F);
+        density = Material::energy(lame, elements.edges(g, local.data()) * B);
       } else {
-        Mat3<T> dF = elements.edges(g, local_p.data()) * B;
+        Mat3<T> D, d;
+        elements.edges(g, local.data(), D, d);
         if constexpr (measure == Measure::change) {
-          dF = T(alpha) * dF;
-          F = F + dF;
-          density = Material::change(lame, Material::evaluate(lame, F), dF);
+          d = T(alpha) * d;
+          density = TetState<Material, T>(lame, B, D + d).change(d);
         } else {
-          density = Material::quadratic(Material::evaluate(lame, F), dF);
+          density = TetState<Material, T>(lame, B, D).quadratic(d);
           if constexpr (certifies) {
-            square_length = min(square_length, certificate.square_length(B, F, dF));
+            square_length = min(square_length, certificate.square_length(B, D, d));
           }
         }
       }
-      energies(g) = sum_lanes(T(elements.volume(g) * density));
+      store(T(elements.volume(g) * density), energies.data() + g * Base::width);
     };
     Kokkos::parallel_for(Kokkos::TeamThreadRange(team, this->groups(patch)), body);
     team.team_barrier();
@@ -265,10 +264,10 @@ struct GatherShared {
   SweepOutput<S, Real> output;
 
   KOKKOS_FUNCTION void operator()(int i) const {
-    Real sum[numbers] = {};
+    Real sum[padded(numbers)] = {};
     for (int row = patches.shared_begin(i); row < patches.shared_begin(i + 1); ++row) {
-      Real const* from = output.partial.data() + std::size_t(numbers) * row;
-      for (int c = 0; c < numbers; ++c) sum[c] += from[c];
+      Real const* from = output.partial.data() + std::size_t(padded(numbers)) * row;
+      for (int c = 0; c < padded(numbers); ++c) sum[c] += from[c];
     }
     output.template add<numbers>(patches.shared(i), sum);
   }

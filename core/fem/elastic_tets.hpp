@@ -316,7 +316,7 @@ void ElasticTets<Material, Precision, Space>::provide_partial(Output& to, int nu
   if (to.fixed.extent_int(0) != patches_.vertices)
     throw Error("ElasticTets: the mesh has {} vertices, the potential {} unknowns",
                 patches_.vertices, to.fixed.extent(0));
-  std::size_t const needed = std::size_t(numbers) * patches_.shared_rows;
+  std::size_t const needed = std::size_t(kernels::padded(numbers)) * patches_.shared_rows;
   if (partial_.extent(0) < needed) {
     // Zeros: rows of idle patches are read, if for nothing, before they are first written.
     partial_ = Scratch("elastic_partial", needed);

@@ -4,6 +4,7 @@
 
 #include <taut/core/fem/patch_sweep.hpp>
 #include <taut/core/math/cubic.hpp>
+#include <taut/core/math/edges.hpp>
 
 namespace taut::kernels {
 
@@ -19,17 +20,18 @@ double step_with_margin(double at_most, First const& first) {
   return length < asked ? inversion_margin * length : at_most;
 }
 
-/// A length t such that x + s p certainly inverts no element for |s| <= t, found without roots:
-/// det(F + s dF) > 0 while |s| |F^-1 dF| < 1, and F^-1 dF = C' dF / J with the cofactor C. Zero
-/// where an element is so flat that round-off counts, or where anything is not a number. All in
-/// squares, and with |C| <= I2 / sqrt 3, so that one root per patch is enough.
+/// A length t such that x + s p certainly inverts no element for |s| <= t, found without roots.
+/// With the edges D, their change d and C = det(B) cof(D), so that D^-1 = C' / J,
+///   det(D + s d) = det(D) det(1 + s D^-1 d) > 0 while |s| |C' d| < J.
+/// Zero where an element is so flat that round-off counts, or where anything is not a number. All
+/// in squares, and with |cof D| <= |D|^2 / sqrt 3, so that one root per patch is enough.
 ///
-/// Round-off: with m the largest local coordinate, an edge is off by at most 2 eps m and F by dF0 =
-/// 2 eps m |B|. While J > 32 |C| dF0 that changes F^-1 by less than 1/16, and while J > 1e-4 |F|^3
-/// the errors of C and J themselves are far below that; the factor 0.9 covers both. What the same
-/// errors do to C' dF,
-///   e = I2 (8 eps |dF| + 8 eps m_p |B|),
-/// is added to it: (|C' dF| + e)^2 <= 17/16 |C' dF|^2 + 17 e^2. The squares are kept from the
+/// Round-off: with m the largest local coordinate, a number of D is off by at most 2 eps m, D by E
+/// = 6 eps m. While J > 16 |C| E that takes 1/16 from the bound on the right, and while J > 1e-4
+/// |det B| |D|^3 the errors of C and J themselves are far below that; the factor 0.9 covers both.
+/// What the same errors do to C' d,
+///   e = |det B| |D|^2 (8 eps |d| + 8 eps m_p),
+/// is added to it: (|C' d| + e)^2 <= 17/16 |C' d|^2 + 17 e^2. The squares are kept from the
 /// smallest numbers by `least_square`, and what has overflowed certifies nothing.
 template <class T>
 struct InversionCertificate {
@@ -37,21 +39,24 @@ struct InversionCertificate {
   static constexpr Real eps = Kokkos::Experimental::epsilon_v<Real>;
   static constexpr Real least_square = Real(1e-30);
 
-  T flat;   ///< (64 eps m)^2 / 3
-  T shaky;  ///< 34 (8 eps m_p)^2
+  T flat;   ///< (96 eps m)^2 / 3
+  T shaky;  ///< m_p^2
 
   /// `largest_x`, `largest_p`: m and m_p, the largest numbers of the local fields.
   KOKKOS_FORCEINLINE_FUNCTION InversionCertificate(Real largest_x, Real largest_p)
-      : flat(square(64 * eps * largest_x) / 3), shaky(34 * square(8 * eps * largest_p)) {}
+      : flat(square(96 * eps * largest_x) / 3), shaky(square(largest_p)) {}
 
   /// t^2 of an element.
-  KOKKOS_FORCEINLINE_FUNCTION T square_length(Mat3<T> const& B, Mat3<T> const& F,
-                                              Mat3<T> const& dF) const {
-    Mat3<T> const C = cofactor(F), G = transpose_times(C, dF);
-    T const J = dot(F.column(0), C.column(0)), I2 = contract(F, F), B2 = contract(B, B);
-    T const least = square(I2) * max(T(Real(1e-8)) * I2, flat * B2) + T(least_square);
-    T const error = square(I2) * (T(34 * square(8 * eps)) * contract(dF, dF) + shaky * B2);
-    T const motion = T(Real(17) / 16) * contract(G, G) + error + T(least_square);
+  KOKKOS_FORCEINLINE_FUNCTION T square_length(Mat3<T> const& B, Mat3<T> const& D,
+                                              Mat3<T> const& d) const {
+    T const det_B = determinant(B);
+    auto const [C, J] = scaled_cofactor(det_B, D);
+    Mat3<T> const G = transpose_times(C, d);
+    Sym3<T> const dd = gram_of_columns(d);
+    T const D2 = contract_columns(D, D), size = square(det_B * D2);
+    T const least = size * max(T(Real(1e-8)) * D2, flat) + T(least_square);
+    T const error = size * (T(34 * square(8 * eps)) * (dd.s[0] + dd.s[1] + dd.s[2] + shaky));
+    T const motion = T(Real(17) / 16) * contract_columns(G, G) + error + T(least_square);
     T const length = select(J * abs(J) > least, T(Real(0.81)) * square(J) / motion, T(0));
     return select(length <= T(Kokkos::Experimental::finite_max_v<Real>), length, T(0));
   }
@@ -73,7 +78,7 @@ struct InversionSweep : PatchSweep<S, typename Precision::real> {
   Kokkos::View<double*, typename S::memory> bound;  ///< per patch
 
   std::size_t scratch_bytes() const {
-    return 2 * ScratchField<S, Real>::shmem_size(std::size_t(4) * this->patches.max_locals);
+    return ScratchField<S, Real>::shmem_size(this->row_numbers());
   }
 
   template <class Field>
@@ -113,20 +118,17 @@ struct InversionSweep : PatchSweep<S, typename Precision::real> {
   KOKKOS_FUNCTION void operator()(typename S::team_member const& team) const {
     int const patch = team.league_rank();
     auto const& v = this->patches;
-    ScratchField<S, Real> const local_x(team.team_scratch(0), 4 * v.max_locals);
-    ScratchField<S, Real> const local_p(team.team_scratch(0), 4 * v.max_locals);
-    this->load_relative(team, patch, x, local_x);
-    this->load_relative(team, patch, p, local_p);
+    ScratchField<S, Real> const local(team.team_scratch(0), this->row_numbers());
+    Real const largest_x = this->template load_relative<true>(team, patch, x, 0, local);
+    Real const largest_p = this->template load_relative<true>(team, patch, p, 1, local);
     team.team_barrier();
-    InversionCertificate<T> const certificate(this->largest(team, patch, local_x),
-                                              this->largest(team, patch, local_p));
+    InversionCertificate<T> const certificate(largest_x, largest_p);
     auto const elements = this->elements(patch);
     T square_length(Kokkos::Experimental::finite_max_v<Real>);
     auto const certify = [&](int g) __attribute__((always_inline)) {
-      Mat3<T> const B = elements.inverse_rest(g);
-      Mat3<T> const F = elements.edges(g, local_x.data()) * B;
-      Mat3<T> const dF = elements.edges(g, local_p.data()) * B;
-      square_length = min(square_length, certificate.square_length(B, F, dF));
+      Mat3<T> D, d;
+      elements.edges(g, local.data(), D, d);
+      square_length = min(square_length, certificate.square_length(elements.inverse_rest(g), D, d));
     };
     Kokkos::parallel_for(Kokkos::TeamThreadRange(team, this->groups(patch)), certify);
     double length = this->smallest(team, square_length);

@@ -6,7 +6,7 @@
 #include <taut/core/exec/parallel.hpp>
 #include <taut/core/fem/patches.hpp>
 #include <taut/core/math/matrix.hpp>
-#include <taut/core/math/rows.hpp>
+#include <taut/core/math/row_pairs.hpp>
 
 namespace taut::kernels {
 
@@ -14,8 +14,11 @@ template <class S, class Real>
 using ScratchField = Kokkos::View<Real*, typename S::execution::scratch_memory_space,
                                   Kokkos::MemoryTraits<Kokkos::Unmanaged>>;
 
+/// Numbers in the rows of four that hold `numbers`.
+KOKKOS_FORCEINLINE_FUNCTION constexpr int padded(int numbers) { return (numbers + 3) / 4 * 4; }
+
 /// Where a sweep leaves what vertices receive: with the vertices that belong to one patch alone,
-/// and in a row of `partial` for each patch that shares a vertex.
+/// and in a row of `partial`, of padded(numbers), for each patch that shares a vertex.
 template <class S, class Real>
 struct SweepOutput {
   Kokkos::View<Real*, typename S::memory> partial;
@@ -25,7 +28,7 @@ struct SweepOutput {
   BlockField<Real, S> blocks;     ///< if there are 9
 
   template <int numbers>
-  KOKKOS_FORCEINLINE_FUNCTION void add(int v, Real const (&sum)[numbers]) const {
+  KOKKOS_FORCEINLINE_FUNCTION void add(int v, Real const* sum) const {
     if (fixed(v)) return;
     for (int c = 0; c < 3; ++c) gradient(v, c) += sum[c];
     if constexpr (numbers == 6) {
@@ -56,38 +59,30 @@ struct PatchSweep {
     return (patches.pack_begin(patch + 1) - patches.pack_begin(patch)) * per_pack;
   }
 
-  /// Copies field values of the patch's vertices, less those of its first vertex, in the precision
-  /// of the field, in rows of four.
-  template <class Team, class Field>
-  KOKKOS_FORCEINLINE_FUNCTION void load_relative(Team const& team, int patch, Field const& field,
-                                                 ScratchField<S, Real> const& to) const {
+  /// What the patch's vertices have of a field, less what its first vertex has, in the precision of
+  /// the field: in places 4 `which` and on of a row of eight each. Returns the largest of these
+  /// numbers, without sign, if `measured`; what is not a number is passed over.
+  template <bool measured = false, class Team, class Field>
+  KOKKOS_FORCEINLINE_FUNCTION Real load_relative(Team const& team, int patch, Field const& field,
+                                                 int which, ScratchField<S, Real> const& to) const {
     int const* const vertex = patches.vertex.data() + patches.local_begin(patch);
-    Real* const row = to.data();
+    Real* const rows = to.data() + 4 * which;
     typename Field::non_const_value_type origin[3];
     for (int c = 0; c < 3; ++c) origin[c] = field(*vertex, c);
+    LargestOfRows<Real> largest;
     auto const body = [&](int l) __attribute__((always_inline)) {
-      int const v = vertex[l];
-      for (int c = 0; c < 3; ++c) row[4 * l + c] = static_cast<Real>(field(v, c) - origin[c]);
-      row[4 * l + 3] = 0;
+      store_relative(field, vertex[l], origin, rows + 8 * l);
+      if constexpr (measured) largest.add(rows + 8 * l);
     };
     Kokkos::parallel_for(Kokkos::TeamThreadRange(team, locals(patch)), body);
+    if constexpr (!measured) return 0;
+    Real most = largest.get();
+    team.team_reduce(Kokkos::Max<Real>(most));
+    return most;
   }
-
-  /// The largest number of the patch's rows, without sign; what is not a number is passed over.
-  template <class Team>
-  KOKKOS_FORCEINLINE_FUNCTION Real largest(Team const& team, int patch,
-                                           ScratchField<S, Real> const& field) const {
-    int const count = 4 * locals(patch);
-    Real const* const from = field.data();
-    Value most(0);
-    // The last pack is moved back to where there are numbers: a patch has four rows or more.
-    auto const body = [&](int k) __attribute__((always_inline)) {
-      most = max(most, abs(load<Value>(from + Kokkos::min(k * width, count - width))));
-    };
-    Kokkos::parallel_for(Kokkos::TeamThreadRange(team, (count + width - 1) / width), body);
-    Real result = max_lanes(most);
-    team.team_reduce(Kokkos::Max<Real>(result));
-    return result;
+  /// Numbers in those rows.
+  KOKKOS_FORCEINLINE_FUNCTION std::size_t row_numbers() const {
+    return std::size_t(8) * patches.max_locals;
   }
 
   /// The elements of one patch behind plain pointers, which stay in registers through the stores of
@@ -108,16 +103,34 @@ struct PatchSweep {
     KOKKOS_FORCEINLINE_FUNCTION std::uint16_t const* corners(int g) const {
       return corner + g / per_pack * 4 * lanes + g % per_pack * width;
     }
-    /// Edge matrix of group `g`: differences to the corner in the last place.
-    KOKKOS_FORCEINLINE_FUNCTION Mat3<Value> edges(int g, Real const* field) const {
+    /// Edge matrix of group `g`, of the first vectors of `rows`: differences to the corner in the
+    /// last place.
+    KOKKOS_FORCEINLINE_FUNCTION Mat3<Value> edges(int g, Real const* rows) const {
       Mat3<Value> d;
       Value origin[3], end[3];
-      load_rows(field, corners(g) + 3 * lanes, origin);
+      load_rows<2>(rows, corners(g) + 3 * lanes, origin);
       for (int a = 0; a < 3; ++a) {
-        load_rows(field, corners(g) + a * lanes, end);
+        load_rows<2>(rows, corners(g) + a * lanes, end);
         for (int c = 0; c < 3; ++c) d(c, a) = end[c] - origin[c];
       }
       return d;
+    }
+    /// The same of both vectors. No loop: compilers leave one as large as this rolled up.
+    KOKKOS_FORCEINLINE_FUNCTION void edges(int g, Real const* rows, Mat3<Value>& first,
+                                           Mat3<Value>& second) const {
+      Value origin[2][3];
+      load_row_pairs(rows, corners(g) + 3 * lanes, origin[0], origin[1]);
+      set_edges<0>(g, rows, origin, first, second);
+      set_edges<1>(g, rows, origin, first, second);
+      set_edges<2>(g, rows, origin, first, second);
+    }
+    template <int a>
+    KOKKOS_FORCEINLINE_FUNCTION void set_edges(int g, Real const* rows, Value const (&origin)[2][3],
+                                               Mat3<Value>& first, Mat3<Value>& second) const {
+      Value end[2][3];
+      load_row_pairs(rows, corners(g) + a * lanes, end[0], end[1]);
+      for (int c = 0; c < 3; ++c) first(c, a) = end[0][c] - origin[0][c];
+      for (int c = 0; c < 3; ++c) second(c, a) = end[1][c] - origin[1][c];
     }
     KOKKOS_FORCEINLINE_FUNCTION Value shape(int g, int k) const {
       return load<Value>(rest + (g / per_pack * 10 + k) * lanes + g % per_pack * width);
@@ -176,16 +189,17 @@ struct PatchSweep {
     Real* const partial = output.partial.data();
     bool const added = alone(team);
     auto const body = [&](int l) __attribute__((always_inline)) {
-      Real sum[numbers] = {};
+      Real sum[padded(numbers)] = {};
       if (added) {
-        for (int c = 0; c < numbers; ++c) sum[c] = slot[padded(numbers) * l + c];
+        for (int c = 0; c < padded(numbers); ++c) sum[c] = slot[padded(numbers) * l + c];
       } else {
         for (int k = begin[l]; k < begin[l + 1]; ++k) {
           for (int c = 0; c < numbers; ++c) sum[c] += slot[incidence[k] + c * step];
         }
       }
       if (row[l] >= 0) {
-        for (int c = 0; c < numbers; ++c) partial[std::size_t(numbers) * row[l] + c] = sum[c];
+        Real* const to = partial + std::size_t(padded(numbers)) * row[l];
+        for (int c = 0; c < padded(numbers); ++c) to[c] = sum[c];
       } else {
         output.template add<numbers>(vertex[l], sum);
       }
@@ -193,14 +207,24 @@ struct PatchSweep {
     Kokkos::parallel_for(Kokkos::TeamThreadRange(team, locals(patch)), body);
   }
 
-  /// Adds up one number per group, in order, into the patch's entry of `total`.
-  template <class Team, class Energies, class Total>
-  KOKKOS_FORCEINLINE_FUNCTION void add_up(Team const& team, int patch, Energies const& per_group,
+  /// Room for a number of each element of the largest patch.
+  KOKKOS_FORCEINLINE_FUNCTION std::size_t element_numbers() const {
+    return std::size_t(patches.max_packs) * lanes;
+  }
+  /// Adds up what `store` has left of each group, lane by lane and then the lanes, into the patch's
+  /// entry of `total`.
+  template <class Team, class Total>
+  KOKKOS_FORCEINLINE_FUNCTION void add_up(Team const& team, int patch,
+                                          ScratchField<S, Real> const& per_element,
                                           Total const& total) const {
     Kokkos::single(Kokkos::PerTeam(team), [&]() {
-      double sum = 0;
-      for (int g = 0; g < groups(patch); ++g) sum += per_group(g);
-      total(patch) = static_cast<typename Total::value_type>(sum);
+      Real const* const from = per_element.data();
+      double sum[lanes] = {};
+      int const count = groups(patch) * width;
+      for (int k = 0; k < count; k += lanes)
+        for (int i = 0; i < lanes; ++i) sum[i] += double(from[k + i]);
+      for (int i = 1; i < lanes; ++i) sum[0] += sum[i];
+      total(patch) = static_cast<typename Total::value_type>(sum[0]);
     });
   }
 
@@ -213,23 +237,9 @@ struct PatchSweep {
   }
 
 private:
-  /// Numbers in the rows of four that hold `numbers`.
-  KOKKOS_FORCEINLINE_FUNCTION static constexpr int padded(int numbers) {
-    return (numbers + 3) / 4 * 4;
-  }
   /// Distance between two numbers of a slot: one slot per corner, and an odd number of cache lines
   /// so that the numbers of one slot do not fall into the same cache set.
   KOKKOS_FORCEINLINE_FUNCTION int stride() const { return patches.max_packs * 4 * lanes + 16; }
 };
-
-/// Row a of B (a = 0, 1, 2) or minus their sum (a = 3): the gradient of the shape function of the
-/// corner in place a.
-template <class T>
-KOKKOS_FORCEINLINE_FUNCTION Vec3<T> shape_gradient(Mat3<T> const& B, int a) {
-  if (a < 3) return {B(a, 0), B(a, 1), B(a, 2)};
-  Vec3<T> b;
-  for (int c = 0; c < 3; ++c) b[c] = -(B(0, c) + B(1, c) + B(2, c));
-  return b;
-}
 
 }  // namespace taut::kernels

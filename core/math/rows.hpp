@@ -41,16 +41,17 @@ struct Quads {
     // Per quad: a0 a1 b0 b1, or a2 a3 b2 b3.
     return __builtin_shufflevector(a, b, (k / 4 * 4 + 2 * high + k % 2 + k % 4 / 2 * W)...);
   }
-  /// Quad j from from[begin[4 j]...].
-  template <class Index>
+  /// Quad j from from[scale begin[4 j]...].
+  template <int scale, class Index>
   static Vector load(Real const* from, Index const* begin) {
     if constexpr (W == 4) {
       Vector v;
-      std::memcpy(&v, from + *begin, sizeof v);
+      std::memcpy(&v, from + scale * std::size_t(*begin), sizeof v);
       return v;
     } else {
       using Half = Quads<Real, W / 2>;
-      return concatenate(Half::load(from, begin), Half::load(from, begin + W / 2),
+      return concatenate(Half::template load<scale>(from, begin),
+                         Half::template load<scale>(from, begin + W / 2),
                          std::make_integer_sequence<int, W>());
     }
   }
@@ -96,8 +97,8 @@ inline constexpr bool has_quads = false;
 
 #endif
 
-/// to[c] = number c of the row from[begin[lane]...] in every lane, c < 3.
-template <class T, class Index>
+/// to[c] = number c of the row from[scale begin[lane]...] in every lane, c < 3.
+template <int scale = 1, class T, class Index>
 KOKKOS_FORCEINLINE_FUNCTION void load_rows(ValueType<T> const* from, Index const* begin,
                                            T (&to)[3]) {
   if constexpr (kernels::has_quads<T>) {
@@ -105,17 +106,17 @@ KOKKOS_FORCEINLINE_FUNCTION void load_rows(ValueType<T> const* from, Index const
     using Registers = kernels::QuadsOf<T>;
     typename Registers::Vector v[4];
     for (int i = 0; i < 4; ++i) {
-      v[i] = Registers::load(from, begin + i);
+      v[i] = Registers::template load<scale>(from, begin + i);
     }
     Registers::transpose(v);
     for (int c = 0; c < 3; ++c) to[c] = std::bit_cast<T>(v[c]);
 #endif
   } else if constexpr (is_pack<T>) {
     for (int c = 0; c < 3; ++c) {
-      to[c] = T([&](std::size_t lane) { return from[begin[lane] + c]; });
+      to[c] = T([&](std::size_t lane) { return from[scale * begin[lane] + c]; });
     }
   } else {
-    for (int c = 0; c < 3; ++c) to[c] = from[*begin + c];
+    for (int c = 0; c < 3; ++c) to[c] = from[scale * *begin + c];
   }
 }
 

@@ -1,9 +1,11 @@
-// Rows of four in memory, loaded to and added from packs, against loops over single numbers.
-#include <taut/core/math/rows.hpp>
+// Rows of four and eight in memory, loaded to and added from packs, against loops over single
+// numbers.
+#include <taut/core/math/row_pairs.hpp>
 
 #include <catch2/catch_template_test_macros.hpp>
 #include <catch2/catch_test_macros.hpp>
 
+#include <limits>
 #include <random>
 #include <vector>
 
@@ -88,4 +90,42 @@ TEMPLATE_TEST_CASE("add_rows adds lane after lane, also to one row", "[math]", f
   check_scale<1>(rows);
   check_scale<2>(rows);
   check_scale<3>(rows);
+}
+
+TEMPLATE_TEST_CASE("load_row_pairs gathers both vectors of rows of eight", "[math]", float, double,
+                   HostPack<float>, HostPack<double>) {
+  using T = TestType;
+  Rows<T> rows;
+  std::vector<ValueType<T>> const from = rows.numbers(8 * rows.count);
+  for (int repeat = 0; repeat < 300; ++repeat) {
+    rows.draw(repeat);
+    T a[3], b[3];
+    load_row_pairs(from.data(), rows.begin.data(), a, b);
+    for (int c = 0; c < 3; ++c)
+      for (int i = 0; i < rows.lanes; ++i) {
+        std::size_t const row = 2 * std::size_t(rows.begin[i]);
+        if (lane(a[c], i) != from[row + c]) FAIL("first vector, " << c << " of lane " << i);
+        if (lane(b[c], i) != from[row + 4 + c]) FAIL("second vector, " << c << " of lane " << i);
+      }
+  }
+}
+
+TEMPLATE_TEST_CASE("rows hold differences, and their largest passes over what is no number",
+                   "[math]", float, double) {
+  Kokkos::View<double* [3], Kokkos::LayoutLeft, Kokkos::HostSpace> const field("field", 3);
+  for (int i = 0; i < 3; ++i)
+    for (int c = 0; c < 3; ++c) field(i, c) = 1e6 + 0.5 * i - 0.25 * c;
+  field(2, 1) = std::numeric_limits<double>::quiet_NaN();
+  double const origin[3] = {1e6, 1e6 + 1, 1e6};
+  LargestOfRows<TestType> largest;
+  for (int i = 0; i < 3; ++i) {
+    TestType row[4] = {9, 9, 9, 9};
+    store_relative(field, i, origin, row);
+    for (int c = 0; c < 3; ++c) {
+      if (i < 2 || c != 1) CHECK(row[c] == TestType(field(i, c) - origin[c]));
+    }
+    CHECK(row[3] == 0);
+    largest.add(row);
+  }
+  CHECK(largest.get() == TestType(1.25));
 }
