@@ -1,7 +1,10 @@
 #include <taut/apps/program/particle_terms.hpp>
 #include <taut/apps/program/scene.hpp>
 
+#include <fmt/core.h>
+
 #include <array>
+#include <concepts>
 
 namespace taut {
 
@@ -18,7 +21,11 @@ void add_particle_term(ParticleTerms& terms, std::string_view model,
                        std::vector<Lame<double>> const& materials) {
   ElasticModels::with(model, [&]<class Model>() {
     static_assert(ProgramSolid<Model>::lanes == ProgramSolid<FixedCorotated>::lanes);
-    add_solid<Model>(terms, materials);
+    if constexpr (std::same_as<Model, FixedCorotated>) {
+      add_solid<Model>(terms, materials);
+    } else {
+      add_solid_late<Model>(fmt::format("{} of material points", model), terms, materials);
+    }
     return true;
   });
 }

@@ -1,7 +1,8 @@
 // The elastic terms over particles that the program knows: every model, with its Hessian projected.
-// Each model is compiled in a source file of its own.
+// The default model is compiled in particle_terms.cpp, each other one in a source of apps/variants.
 #pragma once
 
+#include <taut/apps/program/late_part.hpp>
 #include <taut/apps/program/particle_potential.hpp>
 #include <taut/materials/models.hpp>
 #include <taut/mpm/elastic_particles.hpp>
@@ -14,6 +15,13 @@ using ProgramSolid = ElasticParticles<Elastic<Model, FullProjection>, ParticleKe
 
 /// Adds the elastic term of `Model`.
 template <class Model>
-void add_solid(ParticleTerms& terms, std::vector<Lame<double>> const& materials);
+void add_solid(ParticleTerms& terms, std::vector<Lame<double>> const& materials) {
+  terms.add(ProgramSolid<Model>(materials));
+}
+
+/// The same for a model other than the default.
+template <class Model>
+inline constinit LatePart<void(ParticleTerms&, std::vector<Lame<double>> const&)> add_solid_late =
+    {};
 
 }  // namespace taut

@@ -1,7 +1,0 @@
-#include <taut/apps/program/particle_terms_impl.hpp>
-
-namespace taut {
-
-template void add_solid<Arap>(ParticleTerms&, std::vector<Lame<double>> const&);
-
-}  // namespace taut
