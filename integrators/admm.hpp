@@ -50,17 +50,6 @@ struct SplitRightHandSide {
   }
 };
 
-template <class P, class S>
-struct GradientInMass {
-  VectorField<typename P::real, S> g;
-  Array<typename P::real, S> mass;
-  KOKKOS_FUNCTION void operator()(int i, Sums<double, 1>& sums) const {
-    double square = 0;
-    for (int c = 0; c < 3; ++c) square += double(g(i, c)) * double(g(i, c));
-    if (square > 0) sums[0] += square / double(mass(i));
-  }
-};
-
 }  // namespace kernels
 
 template <class Copies_, class Stopping_ = DecrementWindow, class Precision_ = Mixed,
@@ -130,9 +119,10 @@ private:
   template <class E>
   void measure(E& e, Positions const& x, NewtonReport& report) {
     e.gradient(x, gradient_);
-    using InMass = kernels::GradientInMass<Precision, Space>;
-    double const square =
-        reducer_.template sum<1>("admm_gradient", e.size(), InMass{gradient_, e.mass()})[0];
+    // Its right-hand side is none here: step() writes right_ anew, from the split function.
+    using Norms = kernels::NewtonRightHandSide<Precision, Space>;
+    double const square = reducer_.template sum<Norms::count>(
+        "admm_gradient", e.size(), Norms{gradient_, right_, e.mass()})[Norms::weighted];
     report.gradient_norm = std::sqrt(square / e.scale().mass);
     if (!std::isfinite(square)) {
       report.stop = Stop::non_finite;
@@ -187,7 +177,7 @@ private:
     direction_ = memory_[2].resize("admm_direction", n);
     from_ = from_memory_.resize("admm_from", n);
     linear_.resize(n);
-    reducer_.provide(n, 1);
+    reducer_.provide(n, kernels::NewtonRightHandSide<Precision, Space>::count);
   }
 
   Params params_;

@@ -1,5 +1,6 @@
 // The elastic terms that the program knows: every model in every precision with the clamped filter,
-// and with the other filters in fp64. Each model is compiled in a source file of its own.
+// and with the other filters in fp64. All but fp64 with the clamped filter is compiled in
+// apps/variants.
 #pragma once
 
 #include <taut/apps/program/scene.hpp>

@@ -9,6 +9,7 @@
 
 #include <support/threads.hpp>
 
+#include <limits>
 #include <random>
 
 #include "golden_block.hpp"
@@ -148,6 +149,15 @@ TEST_CASE("steps of ADMM end where the reference does, on any number of threads"
   run("drop", 1.6, 200);
   auto const threads = test::on_one_thread_and_all([&] { return run("drop", 1, 250); });
   CHECK(threads[0] == threads[1]);
+}
+
+TEST_CASE("ADMM from what is not a number says so", "[mpm][admm]") {
+  Block step("drop");
+  auto const x = step.start();
+  x(0, 0) = std::numeric_limits<double>::quiet_NaN();
+  auto const report = Admm<ParticleSplitting<P>, DecrementWindow, P>().minimise(step.scene, x);
+  CHECK(report.stop == Stop::non_finite);
+  CHECK(report.iterations == 0);
 }
 
 }  // namespace taut
