@@ -197,6 +197,7 @@ struct VertexBoxes {
   Motion<Precision, S> motion;
   Vec3<double> centre;
   double radius, centre_size;
+  Array<double, S> own_radius;  ///< in addition, m; empty: none
   Kokkos::View<SearchBox*, typename S::memory> of_vertex;
 
   KOKKOS_FUNCTION void operator()(int i) const {
@@ -210,9 +211,10 @@ struct VertexBoxes {
       size_x = Kokkos::max(size_x, Kokkos::max(Kokkos::abs(x[c]), Kokkos::abs(x[c] + step[c])));
       size_step = Kokkos::max(size_step, Kokkos::abs(step[c]));
     }
-    double const grow = 0.5 * radius + (size_step > 0 ? epsilon_x * size_x : 0) +
+    double const around = own_radius.extent(0) > 0 ? own_radius(v) : 0;
+    double const grow = 0.5 * radius + around + (size_step > 0 ? epsilon_x * size_x : 0) +
                         2 * epsilon * size_step +
-                        8 * epsilon_here * (size_x + size_step + centre_size + radius);
+                        8 * epsilon_here * (size_x + size_step + centre_size + radius + around);
     SearchBox box;
     for (int c = 0; c < 3; ++c) {
       double const a = x[c] - centre[c], b = x[c] + step[c] - centre[c];
@@ -258,10 +260,12 @@ public:
         triangles_{Boxes("triangle_box", surface.triangles()), surface.triangles()} {}
 
   /// So that primitives that come closer than `radius` (m) during the motion have boxes that
-  /// overlap. Throws Error if a vertex of the surface is not at a finite place, or the radius not
-  /// a finite length.
+  /// overlap, wherever each vertex is within `own_radius` (m, per vertex of the mesh) of where the
+  /// motion says. Throws Error if a vertex of the surface is not at a finite place, or the radius
+  /// not a finite length.
   template <class Precision>
-  void compute(Motion<Precision, S> const& motion, double radius) {
+  void compute(Motion<Precision, S> const& motion, double radius,
+               Array<double, S> const& own_radius = {}) {
     if (!(radius >= 0 && radius <= std::numeric_limits<double>::max())) {
       throw Error("broad phase: pairs closer than {} m cannot be searched: ask for a length",
                   radius);
@@ -279,7 +283,7 @@ public:
     }
     for_each<S>("vertex_boxes", surface_.vertices(),
                 kernels::VertexBoxes<Precision, S>{surface_, motion, centre, radius, centre_size,
-                                                   of_vertex_});
+                                                   own_radius, of_vertex_});
     double const budget = 32.0 * std::numeric_limits<typename Precision::real>::epsilon();
     primitives<1>("point_boxes", surface_.vertex, budget, points_);
     primitives<2>("edge_boxes", surface_.edge, budget, edges_);

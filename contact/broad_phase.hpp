@@ -100,8 +100,24 @@ struct Held {
   }
 };
 
-/// Of what pairs are made. `vertices(i, j, v)` are those of the pair that box i of those that ask
-/// and box j of those that are asked for make; `accept(asker(i), j)` says whether it is one.
+/// The vertices of a pair of primitives, as `PairIds` has them: of a point and a triangle of the
+/// surface, or of two of its edges.
+template <PairKind kind, class S>
+KOKKOS_FUNCTION void vertices_of(SurfaceViews<S> const& surface, int first, int second,
+                                 int (&v)[4]) {
+  if constexpr (kind == PairKind::point_triangle) {
+    v[0] = surface.vertex(first);
+    for (int a = 0; a < 3; ++a) v[1 + a] = surface.triangle(3 * second + a);
+  } else {
+    for (int a = 0; a < 2; ++a) {
+      v[a] = surface.edge(2 * first + a);
+      v[2 + a] = surface.edge(2 * second + a);
+    }
+  }
+}
+
+/// Of what pairs are made: `accept(asker(i), j)` says whether box i of those that ask and box j of
+/// those that are asked for make one; then `order(i, j, ij)` are its primitives in their order.
 template <class S>
 struct PairPointTriangle {
   static constexpr PairKind kind = PairKind::point_triangle;
@@ -113,16 +129,21 @@ struct PairPointTriangle {
   };
   KOKKOS_FUNCTION Asker asker(int i) const { return {surface.vertex(i)}; }
   KOKKOS_FUNCTION SizeClass least(int) const { return smallest_class; }
-  KOKKOS_FUNCTION void vertices(int i, int j, int (&v)[4]) const {
-    v[0] = surface.vertex(i);
-    for (int a = 0; a < 3; ++a) v[1 + a] = surface.triangle(3 * j + a);
-  }
+  KOKKOS_FUNCTION void order(int i, int j, int (&ij)[2]) const { ij[0] = i, ij[1] = j; }
   KOKKOS_FUNCTION bool accept(Asker const& i, int j) const {
     int const v[4] = {i.vertex, surface.triangle(3 * j), surface.triangle(3 * j + 1),
                       surface.triangle(3 * j + 2)};
     return v[0] != v[1] && v[0] != v[2] && v[0] != v[3] && !held(v);
   }
 };
+
+/// Whether two edges share no vertex and are not held.
+template <class S>
+KOKKOS_FUNCTION bool edges_pair(SurfaceViews<S> const& surface, Held<S> const& held,
+                                int const (&i)[2], int j) {
+  int const v[4] = {i[0], i[1], surface.edge(2 * j), surface.edge(2 * j + 1)};
+  return v[0] != v[2] && v[0] != v[3] && v[1] != v[2] && v[1] != v[3] && !held(v);
+}
 
 template <class S>
 struct PairEdgeEdge {
@@ -139,24 +160,44 @@ struct PairEdgeEdge {
     return {i, {surface.edge(2 * i), surface.edge(2 * i + 1)}, least(i)};
   }
   KOKKOS_FUNCTION SizeClass least(int i) const { return size_class(longest_side(box(i))); }
-  KOKKOS_FUNCTION void vertices(int i, int j, int (&v)[4]) const {
-    int const first = Kokkos::min(i, j), second = Kokkos::max(i, j);
-    for (int a = 0; a < 2; ++a) {
-      v[a] = surface.edge(2 * first + a);
-      v[2 + a] = surface.edge(2 * second + a);
-    }
+  KOKKOS_FUNCTION void order(int i, int j, int (&ij)[2]) const {
+    ij[0] = Kokkos::min(i, j), ij[1] = Kokkos::max(i, j);
   }
   KOKKOS_FUNCTION bool accept(Asker const& i, int j) const {
-    int const v[4] = {i.vertex[0], i.vertex[1], surface.edge(2 * j), surface.edge(2 * j + 1)};
-    if (v[0] == v[2] || v[0] == v[3] || v[1] == v[2] || v[1] == v[3]) return false;
+    if (!edges_pair(surface, held, i.vertex, j)) return false;
     SizeClass const class_j = least(j);
-    bool const asks = i.least != class_j ? i.least < class_j : i.index < j;
-    return asks && !held(v);
+    return i.least != class_j ? i.least < class_j : i.index < j;
+  }
+};
+
+/// Where pairs are written to as the vertices of each.
+template <class S>
+struct WriteVertices {
+  SurfaceViews<S> surface;
+  PairIds<S> ids;
+
+  /// Keeps the partner of pair k until it is written.
+  KOKKOS_FUNCTION int& partner(std::int64_t k) const { return ids(k, 0); }
+  template <class Pairing>
+  KOKKOS_FUNCTION void operator()(Pairing const& pairing, int i, int j, std::int64_t k) const {
+    int ij[2], v[4];
+    pairing.order(i, j, ij);
+    vertices_of<Pairing::kind>(surface, ij[0], ij[1], v);
+    write_pair(v, ids, k);
   }
 };
 
 /// Partners of a box that are kept until the lists have their places.
 inline constexpr int noted_partners = 32;
+
+/// Boxes that ask: those named, or if none is, the first `count`.
+template <class S>
+struct Askers {
+  Kokkos::View<SearchBox const*, typename S::memory> box;
+  int count;
+  Kokkos::View<int const*, typename S::memory> name = {};
+  KOKKOS_FUNCTION int operator()(int k) const { return name.extent(0) > 0 ? name(k) : k; }
+};
 
 /// What a group of boxes finds: how many partners each has, and the first few of them.
 template <class S, class Index, class Pairing>
@@ -166,10 +207,9 @@ struct FindPairs {
 
   Index index;
   Pairing pairing;
-  Kokkos::View<SearchBox const*, typename S::memory> box;
-  int boxes;
+  Askers<S> by;
   Kokkos::View<std::int64_t*, typename S::memory> count;
-  Kokkos::View<int*, typename S::memory> partner;  ///< noted i + k
+  Kokkos::View<int*, typename S::memory> partner;  ///< noted_partners a + k of asker a
 
   struct Visitor {
     FindPairs const& find;
@@ -190,31 +230,32 @@ struct FindPairs {
   };
   KOKKOS_FUNCTION void operator()(int g) const {
     Visitor visitor{*this, group * g, {}, {}};
-    int const left = boxes - group * g, n = left < group ? left : int(group);
-    for (int a = 0; a < n; ++a) visitor.asker[a] = pairing.asker(group * g + a);
+    int const left = by.count - group * g, n = left < group ? left : int(group);
+    for (int a = 0; a < n; ++a) visitor.asker[a] = pairing.asker(by(group * g + a));
     if constexpr (group > 1 && GroupIndex<Index>) {
       QueryGroup query{n, {}, {}};
       for (int a = 0; a < n; ++a) {
-        query.box[a] = box(group * g + a);
-        query.least[a] = pairing.least(group * g + a);
+        int const i = by(group * g + a);
+        query.box[a] = by.box(i);
+        query.least[a] = pairing.least(i);
       }
       index.visit_group(query, visitor);
     } else {
       for (int a = 0; a < n; ++a) {
-        int const i = group * g + a;
-        index.visit(box(i), pairing.least(i), One{visitor, a});
+        int const i = by(group * g + a);
+        index.visit(by.box(i), pairing.least(i), One{visitor, a});
       }
     }
     for (int a = 0; a < n; ++a) count(group * g + a) = visitor.count[a];
   }
 };
 
-/// Writes the pairs of box i, by ascending partner.
-template <class S, class Index, class Pairing>
+/// Writes the pairs of asker a, by ascending partner.
+template <class S, class Index, class Pairing, class Writer>
 struct FillPairs {
   FindPairs<S, Index, Pairing> find;  ///< `count` is now where the pairs of a box begin
   std::int64_t total;
-  PairIds<S> ids;
+  Writer writer;
 
   /// For a box with more partners than were noted.
   struct Visitor {
@@ -222,37 +263,35 @@ struct FillPairs {
     typename Pairing::Asker asker;
     std::int64_t end;
     KOKKOS_FUNCTION void operator()(int j) {
-      if (fill.find.pairing.accept(asker, j)) fill.ids(end++, 0) = j;
+      if (fill.find.pairing.accept(asker, j)) fill.writer.partner(end++) = j;
     }
   };
-  KOKKOS_FUNCTION void operator()(int i) const {
-    std::int64_t const first = find.count(i), last = i + 1 < find.boxes ? find.count(i + 1) : total;
+  KOKKOS_FUNCTION void operator()(int a) const {
+    std::int64_t const first = find.count(a),
+                       last = a + 1 < find.by.count ? find.count(a + 1) : total;
     if (last - first <= noted_partners) {
-      write_noted(i, first, static_cast<int>(last - first));
+      write_noted(a, first, static_cast<int>(last - first));
     } else {
+      int const i = find.by(a);
       // The pairs hold the partners alone until these are sorted.
-      find.index.visit(find.box(i), find.pairing.least(i),
+      find.index.visit(find.by.box(i), find.pairing.least(i),
                        Visitor{*this, find.pairing.asker(i), first});
       sort(first, last);
-      for (std::int64_t k = first; k < last; ++k) write(i, ids(k, 0), k);
+      for (std::int64_t k = first; k < last; ++k) writer(find.pairing, i, writer.partner(k), k);
     }
   }
 
 private:
-  KOKKOS_FUNCTION void write(int i, int j, std::int64_t k) const {
-    int v[4];
-    find.pairing.vertices(i, j, v);
-    write_pair(v, ids, k);
-  }
   /// Each has its place by how many are less: without branches, and side by side on the host.
-  KOKKOS_FUNCTION void write_noted(int i, std::int64_t first, int count) const {
+  KOKKOS_FUNCTION void write_noted(int a, std::int64_t first, int count) const {
     int partner[noted_partners], less[noted_partners] = {};
     for (int k = 0; k < noted_partners; ++k) {
-      partner[k] = k < count ? find.partner(noted_partners * i + k) : 0;
+      partner[k] = k < count ? find.partner(noted_partners * a + k) : 0;
     }
     for (int m = 0; m < count; ++m)
       for (int k = 0; k < noted_partners; ++k) less[k] += partner[m] < partner[k] ? 1 : 0;
-    for (int k = 0; k < count; ++k) write(i, partner[k], first + less[k]);
+    int const i = find.by(a);
+    for (int k = 0; k < count; ++k) writer(find.pairing, i, partner[k], first + less[k]);
   }
   /// Shell's sort with Knuth's gaps (The Art of Computer Programming 3, section 5.2.1): in place,
   /// and for the few partners that there are mostly, an insertion sort.
@@ -261,16 +300,50 @@ private:
     while (gap < (last - first) / 9) gap = 3 * gap + 1;
     for (; gap > 0; gap /= 3) {
       for (std::int64_t k = first + gap; k < last; ++k) {
-        int const j = ids(k, 0);
+        int const j = writer.partner(k);
         std::int64_t to = k;
-        for (; to - gap >= first && ids(to - gap, 0) > j; to -= gap) ids(to, 0) = ids(to - gap, 0);
-        ids(to, 0) = j;
+        for (; to - gap >= first && writer.partner(to - gap) > j; to -= gap) {
+          writer.partner(to) = writer.partner(to - gap);
+        }
+        writer.partner(to) = j;
       }
     }
   }
 };
 
 }  // namespace kernels
+
+/// Lets boxes ask for those that they overlap. Owns the memory that this takes.
+template <class S>
+class BoxInquiry {
+public:
+  BoxInquiry() = default;
+  explicit BoxInquiry(int most_askers)
+      : begin_("candidate_begin", most_askers),
+        partner_("candidate_partner", kernels::noted_partners * begin_.extent(0)) {}
+
+  /// Writes the pairs that `by` makes with what is in `index`, sorted by the one who asks, then by
+  /// who is found. `room(n)` makes room for n of them and says where they go. Returns n.
+  template <class Index, class Pairing, class Room>
+  std::int64_t ask(kernels::Askers<S> const& by, Index const& index, Pairing const& pairing,
+                   Room const& room) const {
+    using Find = kernels::FindPairs<S, Index, Pairing>;
+    Kokkos::View<std::int64_t*, typename S::memory> const begin(begin_,
+                                                                Kokkos::make_pair(0, by.count));
+    Find const find{index, pairing, by, begin, partner_};
+    for_each<S>("candidates_find", (by.count + Find::group - 1) / Find::group, find);
+    std::int64_t const total = exclusive_scan<S, std::int64_t>("candidates_begin", begin);
+    auto const writer = room(total);
+    using Writer = std::remove_const_t<decltype(writer)>;
+    for_each<S>("candidates_fill", by.count,
+                kernels::FillPairs<S, Index, Pairing, Writer>{find, total, writer});
+    return total;
+  }
+
+private:
+  Kokkos::View<std::int64_t*, typename S::memory> begin_;
+  Kokkos::View<int*, typename S::memory> partner_;
+};
 
 /// Searches one surface, again and again. Owns its memory: it allocates only when a list of
 /// candidates grows.
@@ -286,8 +359,7 @@ public:
       : boxes_(surface),
         triangles_(params, surface.triangles(), edge_length),
         edges_(params, surface.edges(), edge_length),
-        begin_("candidate_begin", std::max(surface.vertices(), surface.edges())),
-        partner_("candidate_partner", kernels::noted_partners * begin_.extent(0)) {}
+        inquiry_(std::max(surface.vertices(), surface.edges())) {}
 
   /// All pairs that come closer than `radius` (m) during the motion, and some that do not. Throws
   /// Error for places that are not finite, and for more pairs than an int can count.
@@ -310,21 +382,15 @@ private:
   template <class Index, class Pairing>
   void ask(BoxSet<Space> const& by, Index const& index, Pairing const& pairing,
            CandidateList<Pairing::kind, Space>& found) const {
-    using Find = kernels::FindPairs<Space, Index, Pairing>;
-    Kokkos::View<std::int64_t*, typename Space::memory> const begin(begin_,
-                                                                    Kokkos::make_pair(0, by.count));
-    Find const find{index, pairing, by.box, by.count, begin, partner_};
-    for_each<Space>("candidates_find", (by.count + Find::group - 1) / Find::group, find);
-    std::int64_t const total = exclusive_scan<Space, std::int64_t>("candidates_begin", begin);
-    found.resize(total);
-    for_each<Space>("candidates_fill", by.count,
-                    kernels::FillPairs<Space, Index, Pairing>{find, total, found.ids()});
+    inquiry_.ask({by.box, by.count}, index, pairing, [&](std::int64_t n) {
+      found.resize(n);
+      return kernels::WriteVertices<Space>{boxes_.surface(), found.ids()};
+    });
   }
 
   SurfaceBoxes<Space> boxes_;
   Policy triangles_, edges_;
-  Kokkos::View<std::int64_t*, typename Space::memory> begin_;
-  Kokkos::View<int*, typename Space::memory> partner_;
+  BoxInquiry<Space> inquiry_;
 };
 
 }  // namespace taut

@@ -19,14 +19,15 @@
 // one body, whose boxes overlap for ever, are no candidates unless they come to act: a body far
 // from all others has none.
 //
+// Candidates are chosen among neighbours (neighbours.hpp), which reach a skin further and are kept
+// up to date vertex by vertex: choosing costs much less than a search.
+//
 // The same bound says what cannot touch. A pair of the list does not act at x while m < d - a, with
 // d kept from the search: one number to read instead of four vertices. Where that holds for all,
 // the list need not be looked at.
 #pragma once
 
-#include <taut/contact/activation.hpp>
-#include <taut/contact/broad_phase.hpp>
-#include <taut/contact/displacement.hpp>
+#include <taut/contact/neighbours.hpp>
 
 namespace taut {
 
@@ -57,61 +58,6 @@ struct Depart {
       to.from(v, c) = x[c];
       to.path(v, c) = step[c];
     }
-  }
-};
-
-/// Keeps pairs that may act, or be half of dhat apart, once their distance has fallen by `reach`,
-/// or in the course of `motion`.
-template <class Precision, class S>
-struct WithinReach {
-  Activation<S> activation;
-  Displacement reach;
-  Motion<Precision, S> motion;
-
-  /// Compiled once, as what contact_kernels.hpp computes: which pairs are candidates must not
-  /// depend on the number of threads.
-  [[gnu::noinline]] KOKKOS_FUNCTION bool operator()(PairKind kind, int const (&v)[4],
-                                                    Vec3<double> const (&y)[4],
-                                                    PairNote& note) const {
-    bool const one_body = activation.one_body(v);
-    double far = one_body ? reach.within : reach.between;
-    if (motion.moves()) far += relative_motion(v, y);
-    double const farthest = activation.dhat + far;
-    if (square_box_gap(kind, y) > (1 + 1e-12) * farthest * farthest) return false;
-    double const low = distance_below(kind, y);
-    if (!(low < farthest)) return false;
-    note.activation = activation(kind, v);
-    note.distance = pair_length(one_body, FoundDistances<S>::shaded(low, y));
-    return low < Kokkos::max(note.activation, 0.5 * activation.dhat) + far;
-  }
-  /// Of the vertices of a pair against each other, and what storing their ends may add: the
-  /// diagonal of the box around their steps.
-  KOKKOS_FUNCTION double relative_motion(int const (&v)[4], Vec3<double> const (&y)[4]) const {
-    constexpr double epsilon_x = Kokkos::Experimental::epsilon_v<typename Precision::position>;
-    constexpr double epsilon = Kokkos::Experimental::epsilon_v<typename Precision::real>;
-    Vec3<double> step[4];
-    for (int a = 0; a < 4; ++a) step[a] = motion.step(v[a]);
-    double square = 0, size = 0, place = 0;
-    for (int c = 0; c < 3; ++c) {
-      double low = step[0][c], high = low;
-      for (int a = 0; a < 4; ++a) {
-        low = Kokkos::min(low, step[a][c]);
-        high = Kokkos::max(high, step[a][c]);
-        size = Kokkos::max(size, Kokkos::abs(step[a][c]));
-        place = Kokkos::max(place, Kokkos::abs(y[a][c] + step[a][c]));
-      }
-      square += (high - low) * (high - low);
-    }
-    // Four vertices, each off by no more than sqrt(3) times what its largest component is.
-    return (1 + 1e-15) * Kokkos::sqrt(square) + 7 * (4 * epsilon * size + 2 * epsilon_x * place);
-  }
-  /// The distance, less the round-off of computing it.
-  KOKKOS_FUNCTION static double distance_below(PairKind kind, Vec3<double> const (&y)[4]) {
-    double size = 0;
-    for (int a = 1; a < 4; ++a) size += norm(y[a] - y[0]);
-    // As for CloserThan.
-    constexpr double budget = 16 * Kokkos::Experimental::epsilon_v<double>;
-    return closest_points(kind, y).distance - budget * size;
   }
 };
 
@@ -171,7 +117,8 @@ public:
   using Space = typename Policy::Space;
   using Positions = VectorField<typename Precision::position, Space>;
   struct Params {
-    double slack = 0.125;  ///< of dhat
+    double slack = 0.04;  ///< of dhat
+    double skin = 0.5;    ///< of dhat: how far the neighbours that candidates are chosen from reach
     typename Policy::Params search = {};
   };
 
@@ -180,19 +127,18 @@ public:
   /// distance is positive, its fraction in (0, 1), and the slack not negative.
   CandidateCache(SurfaceViews<Space> const& surface, double edge_length,
                  Activation<Space> const& activation, Params const& params = {})
-      : search_(surface, edge_length, params.search),
+      : neighbours_(surface, edge_length, params.skin * activation.dhat, params.search),
         activation_(activation),
         slack_(params.slack * activation.dhat),
         displacements_(surface),
-        since_{VectorField<double, Space>("candidate_origin", surface.object.extent(0)),
-               VectorField<double, Space>("candidate_path", surface.object.extent(0))} {
+        since_(make_departure<Space>(surface.object.extent(0))) {
     if (!(activation.dhat > 0 && activation.fraction > 0 && activation.fraction < 1 &&
-          params.slack >= 0)) {
+          params.slack >= 0 && params.skin >= 0)) {
       throw Error(
-          "contact: an activation distance of {} m, {} of the distance at rest at most, and a "
-          "slack "
-          "of {}: give a positive length, a fraction between 0 and 1, and no negative slack",
-          activation.dhat, activation.fraction, params.slack);
+          "contact: an activation distance of {} m, {} of the distance at rest at most, a slack "
+          "of {} and a skin of {}: give a positive length, a fraction between 0 and 1, and neither "
+          "a negative slack nor skin",
+          activation.dhat, activation.fraction, params.slack, params.skin);
     }
   }
 
@@ -216,8 +162,11 @@ public:
     ++counters_.skipped;
     return Touch::impossible;
   }
-  /// Makes the next update search.
-  void forget() { complete_ = false; }
+  /// Makes the next update search through the whole surface.
+  void forget() {
+    complete_ = false;
+    neighbours_.forget();
+  }
 
   Candidates<Space> const& candidates() const { return candidates_; }
   /// How far apart the candidates of a kind were when they were found, and how far they may have
@@ -233,11 +182,14 @@ public:
   /// How far vertices may have moved against each other since the search.
   Displacement const& moved() const { return moved_; }
   CacheCounters const& counters() const { return counters_; }
+  NeighbourCounters const& neighbour_counters() const { return neighbours_.counters(); }
 
 private:
+  using Filter = kernels::WithinReach<Precision, Space>;
+
   /// Around the start of the motion, far enough for its end.
   void search(Motion<Precision, Space> const& motion) {
-    SurfaceViews<Space> const& surface = search_.surface();
+    SurfaceViews<Space> const& surface = neighbours_.surface();
     Motion<Precision, Space> at_start = motion;
     at_start.p = {};
     for_each<Space>("candidate_origin", surface.vertices(),
@@ -248,26 +200,34 @@ private:
     bool const paths = farthest > 2 * slack_ && follow(motion, 2 * farthest);
     reach_ = paths ? Displacement{2 * slack_, 2 * slack_}
                    : Displacement{moved_.within + 2 * slack_, moved_.between + 2 * slack_};
-    double const radius = activation_.dhat + 2 * slack_ + (paths ? 0 : farthest);
-    Motion<Precision, Space> const& along = paths ? motion : at_start;
-    search_.find(along, radius, candidates_);
-    candidates_.keep(kernels::WithinReach<Precision, Space>{activation_, reach_, along}, motion.x);
+    Filter const near{activation_, reach_, paths ? motion : at_start};
+    // What nearly rests is not followed, and asks for a reach of up to twice as far.
+    neighbours_.update(near, since_.leader, 4 * slack_);
+    choose(near, candidates_.point_triangle);
+    choose(near, candidates_.edge_edge);
     constexpr double infinity = std::numeric_limits<double>::infinity();
     clear_for_ = {infinity, infinity};
     lower_clearance(candidates_.point_triangle);
     lower_clearance(candidates_.edge_edge);
     complete_ = true;
   }
+  template <PairKind kind>
+  void choose(Filter const& near, CandidateList<kind, Space>& to) const {
+    to.take(neighbours_.template pairs<kind>(), neighbours_.template count<kind>(),
+            kernels::StillWithinReach<Precision, Space>{near}, near.motion.x);
+  }
 
   /// Names a leader, unless what goes far does so with all others: that has a long path and little
   /// to meet on it.
   bool follow(Motion<Precision, Space> const& motion, double at_most) {
-    kernels::LongestStep<Precision, Space> const step{search_.surface(), motion};
-    int const n = search_.surface().vertices();
+    SurfaceViews<Space> const& surface = neighbours_.surface();
+    kernels::LongestStep<Precision, Space> const step{surface, motion};
+    int const n = surface.vertices();
     double const longest = maximum<Space>("candidate_step", n, 0.0, step);
     if (longest > at_most) return false;
     since_.leader = minimum<Space>("candidate_leader", n, std::numeric_limits<int>::max(),
                                    kernels::FindLeader<Precision, Space>{step, longest});
+    for_each<Space>("candidate_lead", 3, kernels::KeepLead<Space>{since_});
     return true;
   }
 
@@ -278,14 +238,14 @@ private:
     find.join(clear_for_, join_all<Space>("candidate_clearance", list.count(), find));
   }
 
-  PairSearch<Policy> search_;
+  Neighbours<Policy, Precision> neighbours_;
   Activation<Space> activation_;
   double slack_ = 0;
   Displacements<Space> displacements_;
   Departure<Space> since_;  ///< the last search
   Candidates<Space> candidates_;
-  bool complete_ =
-      false;  ///< for the path of the last search, and what is off it by reach_ at most
+  /// For the path of the last search, and what is off it by reach_ at most.
+  bool complete_ = false;
   Displacement reach_;
   Displacement clear_for_;  ///< nothing acts until so much has moved
   Displacement moved_;      ///< in the motion that was last asked for

@@ -92,10 +92,18 @@ KOKKOS_INLINE_FUNCTION void write_pair(int const (&v)[4], Ids const& ids, std::i
   for (int a = 0; a < 4; ++a) ids(k, a) = v[a];
 }
 
-/// Whether pair k is kept, as 1 or 0, and what is noted of it.
-template <PairKind kind, class S, class Positions, class Filter>
-struct JudgePairs {
+/// Pairs to choose from: `read(k, v)` gives the vertices of pair k. If there is `known(k)`, a
+/// filter starts from that note.
+template <class S>
+struct ListedPairs {
   PairIds<S> ids;
+  KOKKOS_FUNCTION void read(int k, int (&v)[4]) const { read_pair(ids, k, v); }
+};
+
+/// Whether pair k is kept, as 1 or 0, and what is noted of it.
+template <PairKind kind, class S, class Source, class Positions, class Filter>
+struct JudgePairs {
+  Source pairs;
   Positions x;
   Filter filter;
   Kokkos::View<int*, typename S::memory> kept;
@@ -103,10 +111,11 @@ struct JudgePairs {
   KOKKOS_FUNCTION void operator()(int k) const {
     int v[4];
     Vec3<double> y[4];
-    read_pair(ids, k, v);
+    pairs.read(k, v);
     gather(v, x, y);
     if constexpr (NotingFilter<Filter>) {
       PairNote note;
+      if constexpr (requires { pairs.known(k); }) note = pairs.known(k);
       bool const keep = filter(kind, v, y, note);
       kept(k) = keep ? 1 : 0;
       if (keep) notes.write(k, note);
@@ -117,9 +126,9 @@ struct JudgePairs {
 };
 
 /// Moves pair k to place(k), if the next one has another place.
-template <class S>
+template <class S, class Source>
 struct MovePairs {
-  PairIds<S> from;
+  Source from;
   Kokkos::View<int const*, typename S::memory> place;
   PairIds<S> to;
   NoteFields<S> notes_from, notes_to;  ///< empty: without
@@ -128,7 +137,7 @@ struct MovePairs {
     int const next = k + 1 < count ? place(k + 1) : kept;
     if (next == place(k)) return;
     int v[4];
-    read_pair(from, k, v);
+    from.read(k, v);
     write_pair(v, to, place(k));
     if (notes_to.distance.extent(0) > 0) notes_to.write(place(k), notes_from.read(k));
   }
@@ -164,30 +173,39 @@ public:
   /// the vertices of a pair and y is where these are at `x`.
   template <class Filter, class Positions>
   void keep(Filter const& filter, Positions const& x) {
-    grow(place_, "candidate_place", count_);
-    grow(spare_, "candidates", count_);
-    if constexpr (kernels::NotingFilter<Filter>) {
-      for (kernels::NoteFields<S>* notes : {&notes_, &spare_notes_}) {
-        grow(notes->distance, "candidate_distance", count_);
-        grow(notes->activation, "candidate_activation", count_);
-      }
-    } else {
-      notes_ = spare_notes_ = {};
-    }
-    for_each<S>("candidates_judge", count_,
-                kernels::JudgePairs<kind, S, Positions, Filter>{ids_, x, filter, place_, notes_});
-    Kokkos::View<int*, typename S::memory> const place(place_, Kokkos::make_pair(0, count_));
-    int const kept = exclusive_scan<S, int>("candidates_place", place);
-    for_each<S>("candidates_move", count_,
-                kernels::MovePairs<S>{ids_, place, spare_, notes_, spare_notes_, count_, kept});
     std::swap(ids_, spare_);
-    std::swap(notes_, spare_notes_);
+    take(kernels::ListedPairs<S>{spare_}, count_, filter, x);
+  }
+  /// Becomes what the filter leaves of the first `count` pairs of a source, in their order.
+  template <class Source, class Filter, class Positions>
+  void take(Source const& from, int count, Filter const& filter, Positions const& x) {
+    constexpr bool notes = kernels::NotingFilter<Filter>;
+    grow(place_, "candidate_place", count);
+    if constexpr (notes) grow_notes(judged_, count);
+    for_each<S>(
+        "candidates_judge", count,
+        kernels::JudgePairs<kind, S, Source, Positions, Filter>{from, x, filter, place_, judged_});
+    Kokkos::View<int*, typename S::memory> const place(place_, Kokkos::make_pair(0, count));
+    int const kept = exclusive_scan<S, int>("candidates_place", place);
+    grow(ids_, "candidates", kept);
+    if constexpr (notes) {
+      grow_notes(notes_, kept);
+    } else {
+      notes_ = {};
+    }
+    for_each<S>("candidates_move", count,
+                kernels::MovePairs<S, Source>{from, place, ids_, judged_, notes_, count, kept});
     count_ = kept;
   }
 
 private:
+  static void grow_notes(kernels::NoteFields<S>& notes, int count) {
+    grow(notes.distance, "candidate_distance", count);
+    grow(notes.activation, "candidate_activation", count);
+  }
+
   PairIds<S> ids_, spare_;
-  kernels::NoteFields<S> notes_, spare_notes_;
+  kernels::NoteFields<S> notes_, judged_;
   Kokkos::View<int*, typename S::memory> place_;
   int count_ = 0;
 };

@@ -262,7 +262,9 @@ private:
       clearance.ample = std::min(clearance.ample, activation.dhat);
       near = Cache(surface, edges.mean, activation, params.search);
       brief = std::max(portion, 2 * params.search.slack * activation.dhat);
-      swept = Cache(surface, edges.mean, activation, params.search);
+      typename Cache::Params once = params.search;
+      once.skin = 0;  // a long motion is not followed by others like it
+      swept = Cache(surface, edges.mean, activation, once);
       table = Table(surface, activation, params.stiffness, params.mollifier_threshold,
                     vertex_areas(host, rest), fixed);
       kernels::check_clearance(clearance, 1);

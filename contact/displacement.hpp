@@ -31,18 +31,43 @@ KOKKOS_FORCEINLINE_FUNCTION float pair_length(bool one_body, float length) {
 /// Where the vertices of a mesh were, and a motion from there that has been looked at in full.
 template <class S>
 struct Departure {
-  VectorField<double, S> from;  ///< m
-  VectorField<double, S> path;  ///< m
-  int leader = -1;              ///< a vertex that goes far on its path; -1: none goes anywhere
+  VectorField<double, S> from;       ///< m
+  VectorField<double, S> path;       ///< m
+  int leader = -1;                   ///< a vertex that goes far on its path; -1: none goes anywhere
+  VectorField<double, S> lead = {};  ///< rows: where the leader was, and its path; m
 };
+
+template <class S>
+Departure<S> make_departure(std::size_t vertices) {
+  return {VectorField<double, S>("departure_from", vertices),
+          VectorField<double, S>("departure_path", vertices), -1,
+          VectorField<double, S>("departure_lead", 2)};
+}
 
 namespace kernels {
 
-/// The displacements since a departure, at the start and the end of a motion, give or take the
-/// round-off of both: that of these sums, and that with which the end is stored. And what of them
-/// is off the path: u - s path, s being how far along the leader is, from 0 to 1.
+/// Remembers where the leader was and where it goes.
+template <class S>
+struct KeepLead {
+  Departure<S> of;
+  KOKKOS_FUNCTION void operator()(int c) const {
+    of.lead(0, c) = of.from(of.leader, c);
+    of.lead(1, c) = of.path(of.leader, c);
+  }
+};
+
+/// Component c of where a vertex is on a motion, at its start or its end: how far from where it was
+/// at a departure, and how far off the path from there; m. The errors are the round-off of these
+/// sums, and that with which an end is stored.
+struct PlaceComponent {
+  double moved, off, error;
+  KOKKOS_FUNCTION double off_error() const { return 2 * error; }
+};
+
+/// Vertices on a motion, as seen from a departure. Along its path they are s of the whole, 0 to 1,
+/// by how far the leader is.
 template <class Precision, class S>
-struct DisplacementCloud {
+struct MotionSince {
   Motion<Precision, S> motion;
   Departure<S> since;
 
@@ -52,28 +77,41 @@ struct DisplacementCloud {
     Vec3<double> x = motion.start(v), path;
     if (end) x = x + motion.step(v);
     for (int c = 0; c < 3; ++c) {
-      x[c] -= since.from(v, c);
-      path[c] = since.path(v, c);
+      x[c] -= since.lead(0, c);
+      path[c] = since.lead(1, c);
     }
     return Kokkos::min(Kokkos::max(dot(x, path) / dot(path, path), 0.0), 1.0);
   }
-  KOKKOS_FUNCTION void add(int v, double s_start, double s_end, Bounds& all, Bounds& off) const {
+  KOKKOS_FUNCTION PlaceComponent place(int v, int c, Vec3<double> const& x,
+                                       Vec3<double> const& step, bool end, double s) const {
     constexpr double epsilon_x = Kokkos::Experimental::epsilon_v<typename Precision::position>;
     constexpr double epsilon = Kokkos::Experimental::epsilon_v<typename Precision::real>;
     constexpr double epsilon_here = Kokkos::Experimental::epsilon_v<double>;
-    Vec3<double> const x = motion.start(v), step = motion.step(v);
+    double const from = since.from(v, c), path = since.leader < 0 ? 0.0 : since.path(v, c);
+    double const size = Kokkos::abs(x[c]) + Kokkos::abs(from) + Kokkos::abs(path);
+    double const here = 2 * epsilon_here * size;
+    if (!end) return {x[c] - from, x[c] - from - s * path, here};
+    double const at = x[c] + step[c];
+    return {at - from, at - from - s * path,
+            here + 2 * epsilon * Kokkos::abs(step[c]) + epsilon_x * Kokkos::abs(at)};
+  }
+};
+
+/// The displacements since a departure, at the start and the end of a motion, give or take the
+/// round-off of both. And what of them is off the path.
+template <class Precision, class S>
+struct DisplacementCloud {
+  MotionSince<Precision, S> seen;
+
+  KOKKOS_FUNCTION double along(bool end) const { return seen.along(end); }
+  KOKKOS_FUNCTION void add(int v, double s_start, double s_end, Bounds& all, Bounds& off) const {
+    Vec3<double> const x = seen.motion.start(v), step = seen.motion.step(v);
     for (int c = 0; c < 3; ++c) {
-      double const from = since.from(v, c), path = since.leader < 0 ? 0.0 : since.path(v, c);
-      double const size = Kokkos::abs(x[c]) + Kokkos::abs(from) + Kokkos::abs(path);
-      double const here = 2 * epsilon_here * size;
-      extend_axis(all, c, x[c] - from, here, v);
-      extend_axis(off, c, x[c] - from - s_start * path, 2 * here, v);
-      if (!motion.moves()) continue;
-      double const end = x[c] + step[c];
-      double const stored =
-          here + 2 * epsilon * Kokkos::abs(step[c]) + epsilon_x * Kokkos::abs(end);
-      extend_axis(all, c, end - from, stored, v);
-      extend_axis(off, c, end - from - s_end * path, 2 * stored, v);
+      for (int end = 0; end < (seen.motion.moves() ? 2 : 1); ++end) {
+        auto const at = seen.place(v, c, x, step, end == 1, end == 1 ? s_end : s_start);
+        extend_axis(all, c, at.moved, at.error, v);
+        extend_axis(off, c, at.off, at.off_error(), v);
+      }
     }
   }
 };
@@ -188,7 +226,7 @@ public:
     if (bodies < 1) return {};
     using Cloud = kernels::DisplacementCloud<Precision, S>;
     for_each<S>("displacement_chunks", static_cast<int>(bounds_.extent(0)),
-                kernels::ChunkBounds<S, Cloud>{{motion, since}, vertex_, chunk_, bounds_});
+                kernels::ChunkBounds<S, Cloud>{{{motion, since}}, vertex_, chunk_, bounds_});
     auto const result =
         join_all<S>("displacement_bodies", bodies, kernels::FindBodyBounds<S>{bounds_, body_});
     refuse_stray(result.bounds.all);

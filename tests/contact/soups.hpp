@@ -3,6 +3,7 @@
 
 #include <taut/contact/broad_phase.hpp>
 
+#include <algorithm>
 #include <cmath>
 #include <random>
 #include <set>
@@ -204,6 +205,15 @@ public:
     return (pair.kind == PairKind::edge_edge ? edge_edge_ : point_triangle_).contains(pair.v);
   }
   std::size_t size() const { return point_triangle_.size() + edge_edge_.size(); }
+  /// How many of them the other has not.
+  std::size_t missing_from(PairSet const& other) const {
+    auto const lost = [](auto const& these, auto const& those) {
+      return std::count_if(these.begin(), these.end(),
+                           [&](auto const& pair) { return !those.contains(pair); });
+    };
+    return std::size_t(lost(point_triangle_, other.point_triangle_) +
+                       lost(edge_edge_, other.edge_edge_));
+  }
 
 private:
   std::set<std::array<int, 4>> point_triangle_, edge_edge_;

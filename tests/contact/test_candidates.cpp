@@ -332,6 +332,66 @@ TEMPLATE_TEST_CASE("a cache misses no pair over random walks", "[contact]", Spat
   }
 }
 
+TEMPLATE_TEST_CASE("candidates chosen among neighbours are complete, and at rest those of a search",
+                   "[contact]", SpatialHash<S>, Bvh<S>) {
+  TwoBalls const balls(0.25, 3);
+  double const dhat = 0.3 * balls.edge_length;
+  auto const surface = copy_surface<S>(balls.surface);
+  // Without slack, what has moved is chosen anew.
+  using Cache = CandidateCache<TestType, Fp64>;
+  Cache cache(surface, balls.edge_length, balls.activation(dhat), {.slack = 0, .skin = 0.5});
+  Cache fresh(surface, balls.edge_length, balls.activation(dhat), {.slack = 0, .skin = 0});
+  std::vector<Point> x = balls.x;
+  Random random(7);
+  auto const activations = all_activations(balls, dhat);
+  std::size_t different = 0, missed = 0, pairs = 0;
+  int const steps = 60;
+  for (int step = 0; step < steps; ++step) {
+    // All fall and tremble, a few vertices go far, and from step 40 on the first ball turns over
+    // in one step, and stays.
+    for (std::size_t v = 0; v < x.size(); ++v) {
+      Point const tremble = in_cube(random, 5e-3 * dhat), leap = in_cube(random, 0.7 * dhat);
+      bool const leaps = v % 37 == std::size_t(step) % 37;
+      for (int c = 0; c < 3; ++c) x[v][c] += tremble[c] + (leaps ? leap[c] : 0);
+      x[v][1] -= 0.3;
+      if (step == 40 && static_cast<int>(v) < balls.first_of_second) x[v][2] = -x[v][2];
+    }
+    Motion<Fp64, S> motion = at(x);
+    std::vector<Point> end = x;
+    if (step % 2 == 1) {
+      std::vector<Point> p(x.size());
+      for (std::size_t v = 0; v < x.size(); ++v) {
+        p[v] = in_cube(random, v % 29 == 0 ? 2 * dhat : 0.05 * dhat);
+        for (int c = 0; c < 3; ++c) end[v][c] += 0.5 * p[v][c];
+      }
+      motion.p = to_field<double, S>(p);
+      motion.alpha = 0.5;
+    }
+    cache.update(motion);
+    fresh.forget();
+    fresh.update(motion);
+    PairSet const a(to_host(cache.candidates())), b(to_host(fresh.candidates()));
+    if (motion.moves()) {
+      for (auto const& [pair, acts_below] : activations) {
+        double const d = std::min(distance(pair, x), distance(pair, end));
+        missed += d < std::max(acts_below, 0.5 * dhat) && !a.has(pair);
+      }
+    } else {
+      different += a.missing_from(b) + b.missing_from(a);
+    }
+    pairs += std::size_t(cache.candidates().edge_edge.count());
+  }
+  CHECK(different == 0);
+  CHECK(missed == 0);
+  CHECK(pairs > 2000);
+  NeighbourCounters const& counters = cache.neighbour_counters();
+  CHECK(cache.counters().searches == steps);
+  CHECK(counters.full < 6);
+  CHECK(counters.partial > steps / 2);
+  CHECK(counters.vertices < std::int64_t(x.size()) * counters.partial / 5);
+  CHECK(fresh.neighbour_counters().partial == 0);
+}
+
 TEST_CASE("a cache searches when the bound asks for it, and not before", "[contact]") {
   TwoBalls const balls(0.05);
   double const dhat = 0.3 * balls.edge_length;

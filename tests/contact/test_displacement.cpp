@@ -163,7 +163,8 @@ TEST_CASE("what follows a path counts by how far it is off", "[contact]") {
   }
   path[17] = {3, 0, 0};
   astray[17] = {0, 0, 0};
-  Departure<S> const since{to_field<double, S>(origin), to_field<double, S>(path), 17};
+  Departure<S> const since{to_field<double, S>(origin), to_field<double, S>(path), 17,
+                           to_field<double, S>(std::vector<Point>{origin[17], path[17]})};
   auto const at = [&](double s, double by) {
     for (std::size_t v = 0; v < n; ++v)
       for (int c = 0; c < 3; ++c) x[v][c] = origin[v][c] + s * path[v][c] + by * astray[v][c];

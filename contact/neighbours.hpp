@@ -1,0 +1,713 @@
+// Pairs that are near each other, kept up to date vertex by vertex: what candidates are chosen
+// from, so that few of them need a search through the whole surface.
+//
+// A search anchors the vertices. From then on vertex i counts as being at
+//
+//   A_i + s P_i + c,   give or take r_i,
+//
+// A where it was, P the motion that it was to make, s from 0 to 1 how far that has gone, and c any
+// translation, the same for all: what a scene does as a whole costs nothing. The list holds the
+// pairs of which
+//
+//   d(A) < a + reach + |P_i - P_j| + r_i + r_j,
+//
+// a the distance below which the pair is looked after (candidate_cache.hpp) and |P_i - P_j| how far
+// it goes against itself. So it has all that come closer than a + reach, as long as each vertex
+// keeps to its r. A vertex that does not is anchored anew, by itself, where it is: the pairs of its
+// primitives are dropped from the list, and these search again. In a pile most vertices move little
+// while a few move far, so such a search is for few.
+#pragma once
+
+#include <taut/contact/activation.hpp>
+#include <taut/contact/broad_phase.hpp>
+#include <taut/contact/displacement.hpp>
+
+namespace taut {
+
+/// Two numbers per pair: a surface vertex and a triangle, or two edges, the first one first.
+template <class S>
+using PrimitivePairs = Kokkos::View<int* [2], typename S::layout, typename S::memory>;
+
+namespace kernels {
+
+/// Keeps pairs that may act, or be half of dhat apart, once their distance has fallen by `reach`,
+/// or in the course of `motion`.
+template <class Precision, class S>
+struct WithinReach {
+  Activation<S> activation;
+  Displacement reach;
+  Motion<Precision, S> motion;
+
+  /// Compiled once, as what contact_kernels.hpp computes: which pairs are candidates must not
+  /// depend on the number of threads.
+  [[gnu::noinline]] KOKKOS_FUNCTION bool operator()(PairKind kind, int const (&v)[4],
+                                                    Vec3<double> const (&y)[4],
+                                                    PairNote& note) const {
+    bool const one_body = activation.one_body(v);
+    return keep(kind, v, y, one_body, reach_of(one_body, v, y), note);
+  }
+  /// Of a pair whose distance may fall by `far`.
+  KOKKOS_FUNCTION bool keep(PairKind kind, int const (&v)[4], Vec3<double> const (&y)[4],
+                            bool one_body, double far, PairNote& note) const {
+    double const low = distance_below(kind, y, activation.dhat + far);
+    if (!(low < activation.dhat + far)) return false;
+    note.activation = activation(kind, v);
+    note.distance = pair_length(one_body, FoundDistances<S>::shaded(low, y));
+    return low < watched(note.activation) + far;
+  }
+  /// The distance below which a pair is looked after that acts below `acts_below`.
+  KOKKOS_FUNCTION double watched(double acts_below) const {
+    return Kokkos::max(acts_below, 0.5 * activation.dhat);
+  }
+  KOKKOS_FUNCTION double reach_of(bool one_body, int const (&v)[4],
+                                  Vec3<double> const (&y)[4]) const {
+    double const far = one_body ? reach.within : reach.between;
+    return motion.moves() ? far + relative_motion(v, y) : far;
+  }
+  /// Of the vertices of a pair against each other, and what storing their ends may add: the
+  /// diagonal of the box around their steps.
+  KOKKOS_FUNCTION double relative_motion(int const (&v)[4], Vec3<double> const (&y)[4]) const {
+    constexpr double epsilon_x = Kokkos::Experimental::epsilon_v<typename Precision::position>;
+    constexpr double epsilon = Kokkos::Experimental::epsilon_v<typename Precision::real>;
+    Vec3<double> step[4];
+    for (int a = 0; a < 4; ++a) step[a] = motion.step(v[a]);
+    double square = 0, size = 0, place = 0;
+    for (int c = 0; c < 3; ++c) {
+      double low = step[0][c], high = low;
+      for (int a = 0; a < 4; ++a) {
+        low = Kokkos::min(low, step[a][c]);
+        high = Kokkos::max(high, step[a][c]);
+        size = Kokkos::max(size, Kokkos::abs(step[a][c]));
+        place = Kokkos::max(place, Kokkos::abs(y[a][c] + step[a][c]));
+      }
+      square += (high - low) * (high - low);
+    }
+    // Four vertices, each off by no more than sqrt(3) times what its largest component is.
+    return (1 + 1e-15) * Kokkos::sqrt(square) + 7 * (4 * epsilon * size + 2 * epsilon_x * place);
+  }
+  /// The distance, less the round-off of computing it; infinite where boxes tell that it is not
+  /// below `farthest`.
+  KOKKOS_FUNCTION static double distance_below(PairKind kind, Vec3<double> const (&y)[4],
+                                               double farthest) {
+    if (square_box_gap(kind, y) > (1 + 1e-12) * farthest * farthest) {
+      return Kokkos::Experimental::infinity_v<double>;
+    }
+    double size = 0;
+    for (int a = 1; a < 4; ++a) size += norm(y[a] - y[0]);
+    // As for CloserThan.
+    constexpr double budget = 16 * Kokkos::Experimental::epsilon_v<double>;
+    return closest_points(kind, y).distance - budget * size;
+  }
+};
+
+/// The same among neighbours, of which what does not change is known.
+template <class Precision, class S>
+struct StillWithinReach {
+  WithinReach<Precision, S> within;
+
+  /// Compiled once, as in WithinReach.
+  [[gnu::noinline]] KOKKOS_FUNCTION bool operator()(PairKind kind, int const (&v)[4],
+                                                    Vec3<double> const (&y)[4],
+                                                    PairNote& note) const {
+    bool const one_body =
+        note.distance < 0 || (note.distance == 0 && within.activation.one_body(v));
+    double const farthest = within.watched(note.activation) + within.reach_of(one_body, v, y);
+    double const low = within.distance_below(kind, y, farthest);
+    note.distance = pair_length(one_body, FoundDistances<S>::shaded(low, y));
+    return low < farthest;
+  }
+};
+
+/// Where the vertices of a surface are taken to be.
+template <class S>
+struct Anchors {
+  Departure<S> at;          ///< A and P
+  Array<double, S> radius;  ///< r, m
+
+  KOKKOS_FUNCTION Motion<Fp64, S> motion() const {
+    Motion<Fp64, S> m{at.from};
+    if (at.leader >= 0) {
+      m.p = at.path;
+      m.alpha = 1;
+    }
+    return m;
+  }
+};
+
+/// Keeps neighbours, which are judged at their anchors.
+template <class S>
+struct NearAnchors {
+  WithinReach<Fp64, S> within;
+  Array<double, S> radius;
+
+  /// Compiled once, as in WithinReach.
+  [[gnu::noinline]] KOKKOS_FUNCTION bool operator()(PairKind kind, int const (&v)[4],
+                                                    Vec3<double> const (&y)[4],
+                                                    PairNote& note) const {
+    bool const one_body = within.activation.one_body(v);
+    int const second = kind == PairKind::point_triangle ? 1 : 2;
+    double r[2] = {0, 0};
+    for (int a = 0; a < 4; ++a) {
+      r[a < second ? 0 : 1] = Kokkos::max(r[a < second ? 0 : 1], radius(v[a]));
+    }
+    double const far = within.reach_of(one_body, v, y) + r[0] + r[1];
+    return within.keep(kind, v, y, one_body, far, note);
+  }
+};
+
+/// Sums of how far the vertices are off their anchors at the start and the end of a motion.
+template <class Precision, class S>
+struct SumDrift {
+  SurfaceViews<S> surface;
+  MotionSince<Precision, S> seen;
+  double s[2];
+  KOKKOS_FUNCTION void operator()(int i, Sums<double, 6>& sum) const {
+    int const v = surface.vertex(i);
+    Vec3<double> const x = seen.motion.start(v), step = seen.motion.step(v);
+    for (int end = 0; end < 2; ++end)
+      for (int c = 0; c < 3; ++c)
+        sum[3 * end + c] += seen.place(v, c, x, step, end == 1, s[end]).off;
+  }
+};
+
+struct Progress {
+  double start = 0, end = 0;  ///< along a path, 0 to 1
+};
+template <class Precision, class S>
+struct FindProgress {
+  using value_type = Progress;
+  MotionSince<Precision, S> since;
+  KOKKOS_FUNCTION void operator()(int, Progress& p) const {
+    p = {since.along(false), since.along(true)};
+  }
+  KOKKOS_FUNCTION void init(Progress& p) const { p = {}; }
+  KOKKOS_FUNCTION void join(Progress& to, Progress const& from) const {
+    to = {to.start + from.start, to.end + from.end};
+  }
+};
+
+/// How a motion is seen from the anchors: where it is along their path, and what all do together.
+template <class Precision, class S>
+struct SeenFromAnchors {
+  MotionSince<Precision, S> since;
+  double s[2];            ///< at its start and its end
+  Vec3<double> drift[2];  ///< c
+
+  /// Off its anchor, and a bound of the round-off of that, m.
+  KOKKOS_FUNCTION Vec3<double> off(int v, int end, double& error) const {
+    Vec3<double> const x = since.motion.start(v), step = since.motion.step(v);
+    Vec3<double> r;
+    error = 0;
+    for (int c = 0; c < 3; ++c) {
+      auto const at = since.place(v, c, x, step, end == 1, s[end]);
+      r[c] = at.off - drift[end][c];
+      error += at.off_error() + Kokkos::Experimental::epsilon_v<double> *
+                                    (Kokkos::abs(at.off) + Kokkos::abs(drift[end][c]));
+    }
+    return r;
+  }
+};
+
+/// Marks the vertices that do not keep to their anchor, or to which a much smaller radius would do.
+template <class Precision, class S>
+struct FindStrays {
+  SurfaceViews<S> surface;
+  SeenFromAnchors<Precision, S> seen;
+  Array<double, S> radius;
+  double least_radius;
+  Kokkos::View<std::uint8_t*, typename S::memory> stray;
+
+  KOKKOS_FUNCTION void operator()(int i, int& count) const {
+    bool const strays = find(surface.vertex(i));
+    stray(surface.vertex(i)) = strays ? 1 : 0;
+    count += strays ? 1 : 0;
+  }
+  /// Compiled once, as what contact_kernels.hpp computes.
+  [[gnu::noinline]] KOKKOS_FUNCTION bool find(int v) const {
+    double error[2];
+    Vec3<double> const start = seen.off(v, 0, error[0]), end = seen.off(v, 1, error[1]);
+    double const needed = Kokkos::max(norm(start) + error[0], norm(end) + error[1]);
+    bool const loose = radius(v) > 2 * least_radius + 2 * norm(end - start);
+    return !(needed < radius(v)) || loose;
+  }
+  using value_type = int;
+  KOKKOS_FUNCTION void init(int& count) const { count = 0; }
+  KOKKOS_FUNCTION void join(int& to, int from) const { to += from; }
+};
+
+/// Anchors the vertices that stray in the middle of their motion.
+template <class Precision, class S>
+struct AnchorStrays {
+  SurfaceViews<S> surface;
+  SeenFromAnchors<Precision, S> seen;
+  double least_radius;
+  Kokkos::View<std::uint8_t const*, typename S::memory> stray;
+  Anchors<S> anchors;
+
+  KOKKOS_FUNCTION void operator()(int i) const {
+    if (stray(surface.vertex(i)) != 0) anchor(surface.vertex(i));
+  }
+  [[gnu::noinline]] KOKKOS_FUNCTION void anchor(int v) const {
+    Vec3<double> const x = seen.since.motion.start(v), step = seen.since.motion.step(v);
+    double error[2];
+    seen.off(v, 0, error[0]);
+    seen.off(v, 1, error[1]);
+    Vec3<double> const start = x - seen.drift[0], end = x + step - seen.drift[1];
+    for (int c = 0; c < 3; ++c) {
+      anchors.at.from(v, c) = 0.5 * start[c] + 0.5 * end[c];
+      anchors.at.path(v, c) = 0;
+    }
+    anchors.radius(v) = 0.5 * norm(end - start) + least_radius + 2 * (error[0] + error[1]);
+  }
+};
+
+/// Anchors vertex i of the surface where a motion starts, with all of the motion as its path.
+template <class Precision, class S>
+struct AnchorAll {
+  SurfaceViews<S> surface;
+  MotionSince<Precision, S> seen;
+  double least_radius;
+  Anchors<S> anchors;
+
+  KOKKOS_FUNCTION void operator()(int i) const {
+    int const v = surface.vertex(i);
+    Vec3<double> const x = seen.motion.start(v), step = seen.motion.step(v);
+    double error = 0;
+    for (int c = 0; c < 3; ++c) {
+      anchors.at.from(v, c) = x[c];
+      anchors.at.path(v, c) = step[c];
+      error += seen.place(v, c, x, step, true, 0).error;
+    }
+    anchors.radius(v) = least_radius + 4 * error;
+  }
+};
+
+/// Whether a primitive of `corners` vertices has a stray one.
+template <class S, int corners>
+struct HasStray {
+  typename SurfaceViews<S>::Indices corner;
+  Kokkos::View<std::uint8_t const*, typename S::memory> stray;
+  KOKKOS_FUNCTION int operator()(int i) const {
+    int has = 0;
+    for (int a = 0; a < corners; ++a) has |= stray(corner(corners * i + a));
+    return has;
+  }
+};
+
+/// Writes the numbers of those that `chosen` says 1 of to their places.
+template <class S, class Chosen>
+struct ListChosen {
+  Chosen chosen;
+  Kokkos::View<int const*, typename S::memory> place;
+  Kokkos::View<int*, typename S::memory> to;
+  KOKKOS_FUNCTION void operator()(int i) const {
+    if (chosen(i) != 0) to(place(i)) = i;
+  }
+};
+
+/// Of triangles and the points that they ask for: those that do not ask themselves.
+template <class S>
+struct PairTrianglePoint {
+  static constexpr PairKind kind = PairKind::point_triangle;
+  SurfaceViews<S> surface;
+  Held<S> held;
+  HasStray<S, 1> asks;
+
+  struct Asker {
+    int vertex[3];
+  };
+  KOKKOS_FUNCTION Asker asker(int i) const {
+    return {{surface.triangle(3 * i), surface.triangle(3 * i + 1), surface.triangle(3 * i + 2)}};
+  }
+  KOKKOS_FUNCTION SizeClass least(int) const { return smallest_class; }
+  KOKKOS_FUNCTION void order(int i, int j, int (&ij)[2]) const { ij[0] = j, ij[1] = i; }
+  KOKKOS_FUNCTION bool accept(Asker const& i, int j) const {
+    int const v[4] = {surface.vertex(j), i.vertex[0], i.vertex[1], i.vertex[2]};
+    return v[0] != v[1] && v[0] != v[2] && v[0] != v[3] && asks(j) == 0 && !held(v);
+  }
+};
+
+/// Of edges and all others; of two that ask, the first.
+template <class S>
+struct PairEdgeAnew {
+  static constexpr PairKind kind = PairKind::edge_edge;
+  SurfaceViews<S> surface;
+  Held<S> held;
+  HasStray<S, 2> asks;
+
+  struct Asker {
+    int index, vertex[2];
+  };
+  KOKKOS_FUNCTION Asker asker(int i) const {
+    return {i, {surface.edge(2 * i), surface.edge(2 * i + 1)}};
+  }
+  KOKKOS_FUNCTION SizeClass least(int) const { return smallest_class; }
+  KOKKOS_FUNCTION void order(int i, int j, int (&ij)[2]) const {
+    ij[0] = Kokkos::min(i, j), ij[1] = Kokkos::max(i, j);
+  }
+  KOKKOS_FUNCTION bool accept(Asker const& i, int j) const {
+    return (i.index < j || asks(j) == 0) && edges_pair(surface, held, i.vertex, j);
+  }
+};
+
+/// Where pairs are written to as primitives.
+template <class S>
+struct WritePrimitives {
+  PrimitivePairs<S> pairs;
+  KOKKOS_FUNCTION int& partner(std::int64_t k) const { return pairs(k, 0); }
+  template <class Pairing>
+  KOKKOS_FUNCTION void operator()(Pairing const& pairing, int i, int j, std::int64_t k) const {
+    int ij[2];
+    pairing.order(i, j, ij);
+    for (int a = 0; a < 2; ++a) pairs(k, a) = ij[a];
+  }
+};
+
+/// Pairs of primitives as a source of candidates (JudgePairs), with what has been noted of them.
+template <PairKind kind, class S>
+struct FoundPrimitives {
+  SurfaceViews<S> surface;
+  PrimitivePairs<S> pairs;
+  KOKKOS_FUNCTION void read(int k, int (&v)[4]) const {
+    vertices_of<kind>(surface, pairs(k, 0), pairs(k, 1), v);
+  }
+};
+template <PairKind kind, class S>
+struct KnownPrimitives : FoundPrimitives<kind, S> {
+  NoteFields<S> notes;
+  KOKKOS_FUNCTION PairNote known(int k) const { return notes.read(k); }
+};
+
+/// 1 for a pair of which no vertex strays.
+template <PairKind kind, class S>
+struct KeepsAnchors {
+  FoundPrimitives<kind, S> from;
+  Kokkos::View<std::uint8_t const*, typename S::memory> stray;
+  Kokkos::View<int*, typename S::memory> kept;
+  KOKKOS_FUNCTION void operator()(int k) const {
+    int v[4], strays = 0;
+    from.read(k, v);
+    for (int a = 0; a < 4; ++a) strays |= stray(v[a]);
+    kept(k) = strays == 0 ? 1 : 0;
+  }
+};
+
+/// Moves pair k to place(k) after the `first` ones, if the next one has another place.
+template <class S>
+struct MovePrimitives {
+  PrimitivePairs<S> from, to;
+  NoteFields<S> notes_from, notes_to;
+  Kokkos::View<int const*, typename S::memory> place;
+  int first, count, kept;
+  KOKKOS_FUNCTION void operator()(int k) const {
+    int const next = k + 1 < count ? place(k + 1) : kept;
+    if (next == place(k)) return;
+    for (int a = 0; a < 2; ++a) to(first + place(k), a) = from(k, a);
+    notes_to.write(first + place(k), notes_from.read(k));
+  }
+};
+
+template <class S>
+struct CopyPrimitives {
+  PrimitivePairs<S> from, to;
+  NoteFields<S> notes_from, notes_to;
+  KOKKOS_FUNCTION void operator()(int k) const {
+    for (int a = 0; a < 2; ++a) to(k, a) = from(k, a);
+    notes_to.write(k, notes_from.read(k));
+  }
+};
+
+/// Lowers to the first vertex whose mark has changed.
+template <class S>
+struct FindOtherMark {
+  FixedMask<S> mark, before;
+  KOKKOS_FUNCTION void operator()(int v, int& first) const {
+    if (mark(v) != before(v)) first = Kokkos::min(first, v);
+  }
+};
+
+}  // namespace kernels
+
+/// Pairs of primitives of one kind, with what a filter has noted of them.
+template <PairKind kind, class S>
+class NeighbourList {
+public:
+  int count() const { return count_; }
+  kernels::KnownPrimitives<kind, S> pairs(SurfaceViews<S> const& surface) const {
+    return {{surface, pairs_}, notes_};
+  }
+
+  void clear() { count_ = 0; }
+  /// Drops the pairs that have a stray vertex.
+  void drop(SurfaceViews<S> const& surface,
+            Kokkos::View<std::uint8_t const*, typename S::memory> const& stray) {
+    grow(place_, "neighbour_place", count_);
+    for_each<S>("neighbours_drop", count_,
+                kernels::KeepsAnchors<kind, S>{{surface, pairs_}, stray, place_});
+    compact(pairs_, notes_, 0, count_);
+  }
+  /// Makes room for `n` pairs that are to be judged.
+  kernels::WritePrimitives<S> room(std::int64_t n) {
+    if (n > std::numeric_limits<int>::max() / 2 - count_) {
+      throw Error(
+          "contact: {} candidate pairs are more than a list can hold: search within a smaller "
+          "radius, or look for a vertex that has flown off",
+          n + count_);
+    }
+    grow(found_, "neighbours_found", static_cast<std::size_t>(n));
+    return {found_};
+  }
+  /// Appends those of `n` pairs in that room that the filter keeps.
+  template <class Filter, class Positions>
+  void append(int n, SurfaceViews<S> const& surface, Filter const& filter, Positions const& x) {
+    using Source = kernels::FoundPrimitives<kind, S>;
+    grow(place_, "neighbour_place", n);
+    grow_notes(judged_, n);
+    for_each<S>("neighbours_judge", n,
+                kernels::JudgePairs<kind, S, Source, Positions, Filter>{
+                    {surface, found_}, x, filter, place_, judged_});
+    compact(found_, judged_, count_, n);
+  }
+
+private:
+  static void grow_notes(kernels::NoteFields<S>& notes, int count) {
+    grow(notes.distance, "neighbour_distance", count);
+    grow(notes.activation, "neighbour_activation", count);
+  }
+  /// Leaves the first pairs of the list, and after them those of `from` that are marked in place_.
+  void compact(PrimitivePairs<S> const& from, kernels::NoteFields<S> const& notes, int first,
+               int count) {
+    Kokkos::View<int*, typename S::memory> const place(place_, Kokkos::make_pair(0, count));
+    int const kept = exclusive_scan<S, int>("neighbours_place", place);
+    bool const in_place = first > 0 && pairs_.extent_int(0) >= first + kept;
+    PrimitivePairs<S> to = in_place ? pairs_ : spare_;
+    kernels::NoteFields<S> notes_to = in_place ? notes_ : spare_notes_;
+    if (!in_place) {
+      grow(to, "neighbours", first + kept);
+      grow_notes(notes_to, first + kept);
+      for_each<S>("neighbours_copy", first,
+                  kernels::CopyPrimitives<S>{pairs_, to, notes_, notes_to});
+    }
+    for_each<S>("neighbours_move", count,
+                kernels::MovePrimitives<S>{from, to, notes, notes_to, place, first, count, kept});
+    if (!in_place) {
+      spare_ = std::exchange(pairs_, to);
+      spare_notes_ = std::exchange(notes_, notes_to);
+    }
+    count_ = first + kept;
+  }
+
+  PrimitivePairs<S> pairs_, spare_, found_;
+  kernels::NoteFields<S> notes_, spare_notes_, judged_;
+  Kokkos::View<int*, typename S::memory> place_;
+  int count_ = 0;
+};
+
+struct NeighbourCounters {
+  std::int64_t full = 0;      ///< searches of all primitives
+  std::int64_t partial = 0;   ///< searches of those with stray vertices
+  std::int64_t vertices = 0;  ///< stray vertices in the latter
+};
+
+/// Owns its memory: it allocates only when a list grows.
+template <BroadPhase Policy, class Precision>
+class Neighbours {
+public:
+  using Space = typename Policy::Space;
+  template <PairKind kind>
+  using Pairs = kernels::KnownPrimitives<kind, Space>;
+
+  Neighbours() = default;
+  /// `edge_length`: mean length of the surface's edges; `skin`: what two vertices may move against
+  /// each other before one of them is searched for again; m.
+  Neighbours(SurfaceViews<Space> const& surface, double edge_length, double skin,
+             typename Policy::Params const& params)
+      : boxes_(surface),
+        points_(params, surface.vertices(), edge_length),
+        edges_(params, surface.edges(), edge_length),
+        triangles_(params, surface.triangles(), edge_length),
+        inquiry_(std::max({surface.vertices(), surface.edges(), surface.triangles()})),
+        least_radius_(skin / 2),
+        reducer_(surface.vertices(), 6),
+        stray_("neighbour_stray", surface.object.extent(0)),
+        place_("neighbour_asks", std::max(surface.edges(), surface.triangles())),
+        asks_("neighbour_asks", place_.extent(0)) {
+    std::size_t const n = surface.object.extent(0);
+    anchors_.at = make_departure<Space>(n);
+    anchors_.radius = Array<double, Space>("neighbour_radius", n);
+  }
+
+  /// Makes the list hold all pairs that `near` keeps. `leader`: if its motion is followed, a vertex
+  /// that goes far in it, or -1; `reach`: no less, m, if it searches through the whole surface.
+  /// Throws Error for places that are not finite, and for more pairs than an int can count.
+  void update(kernels::WithinReach<Precision, Space> const& near, int leader, double reach) {
+    auto const& motion = near.motion;
+    int const n = surface().vertices();
+    if (n == 0) return;
+    bool const holds = known_ && found_for(motion) && near.reach.within <= reach_.within &&
+                       near.reach.between <= reach_.between;
+    if (holds) {
+      Seen const seen = look(motion);
+      kernels::FindStrays<Precision, Space> const find{surface(), seen, anchors_.radius,
+                                                       least_radius_, stray_};
+      int const strays = join_all<Space>("neighbour_strays", n, find);
+      if (strays == 0) return;
+      if (strays <= n / 4) {
+        known_ = false;  // should a search throw
+        for_each<Space>("neighbour_anchors", n,
+                        kernels::AnchorStrays<Precision, Space>{surface(), seen, least_radius_,
+                                                                stray_, anchors_});
+        ++counters_.partial;
+        counters_.vertices += strays;
+        search_strays(near);
+        known_ = true;
+        return;
+      }
+    }
+    known_ = false;
+    ++counters_.full;
+    reach_ = {std::max(near.reach.within, reach), std::max(near.reach.between, reach)};
+    anchors_.at.leader = leader;
+    for_each<Space>("neighbour_anchors", n,
+                    kernels::AnchorAll<Precision, Space>{
+                        surface(), {motion, anchors_.at}, least_radius_, anchors_});
+    if (leader >= 0) {
+      for_each<Space>("neighbour_lead", 3, kernels::KeepLead<Space>{anchors_.at});
+    }
+    search_all(near);
+    remember(motion);
+  }
+  /// Makes the next update search through the whole surface.
+  void forget() { known_ = false; }
+
+  template <PairKind kind>
+  int count() const {
+    return list<kind>(*this).count();
+  }
+  template <PairKind kind>
+  Pairs<kind> pairs() const {
+    return list<kind>(*this).pairs(surface());
+  }
+  SurfaceViews<Space> const& surface() const { return boxes_.surface(); }
+  NeighbourCounters const& counters() const { return counters_; }
+
+private:
+  using Seen = kernels::SeenFromAnchors<Precision, Space>;
+  using Indices = Kokkos::View<int*, typename Space::memory>;
+  static constexpr PairKind point_triangle = PairKind::point_triangle,
+                            edge_edge = PairKind::edge_edge;
+
+  template <PairKind kind, class Self>
+  static auto& list(Self& self) {
+    if constexpr (kind == point_triangle) {
+      return self.point_triangle_;
+    } else {
+      return self.edge_edge_;
+    }
+  }
+
+  bool found_for(Motion<Precision, Space> const& motion) const {
+    if (motion.between_fixed != between_fixed_) return false;
+    int const n = motion.fixed.extent_int(0);
+    return n == fixed_.extent_int(0) &&
+           minimum<Space>("neighbour_marks", n, n,
+                          kernels::FindOtherMark<Space>{motion.fixed, fixed_}) == n;
+  }
+  void remember(Motion<Precision, Space> const& motion) {
+    if (fixed_.extent(0) != motion.fixed.extent(0)) {
+      fixed_ = FixedMask<Space>("neighbour_fixed", motion.fixed.extent(0));
+    }
+    assign_on<Space>(fixed_, motion.fixed);
+    between_fixed_ = motion.between_fixed;
+    known_ = true;
+  }
+
+  Seen look(Motion<Precision, Space> const& motion) const {
+    kernels::MotionSince<Precision, Space> const since{motion, anchors_.at};
+    Seen seen{since, {}, {}};
+    kernels::Progress const progress =
+        join_all<Space>("neighbour_progress", 1, kernels::FindProgress<Precision, Space>{since});
+    seen.s[0] = progress.start;
+    seen.s[1] = progress.end;
+    int const n = surface().vertices();
+    auto const sum = reducer_.template sum<6>(
+        "neighbour_drift", n,
+        kernels::SumDrift<Precision, Space>{surface(), since, {seen.s[0], seen.s[1]}});
+    for (int end = 0; end < 2; ++end)
+      for (int c = 0; c < 3; ++c) seen.drift[end][c] = sum[3 * end + c] / n;
+    return seen;
+  }
+
+  kernels::NearAnchors<Space> filter(kernels::WithinReach<Precision, Space> const& near) const {
+    return {{near.activation, reach_, anchors_.motion()}, anchors_.radius};
+  }
+  /// Boxes around the anchors.
+  void compute_boxes(kernels::WithinReach<Precision, Space> const& near) {
+    double const reach = std::max(reach_.within, reach_.between);
+    boxes_.compute(anchors_.motion(), near.activation.dhat + reach, anchors_.radius);
+    triangles_.build(boxes_.triangles());
+    edges_.build(boxes_.edges());
+  }
+
+  void search_all(kernels::WithinReach<Precision, Space> const& near) {
+    compute_boxes(near);
+    kernels::Held<Space> const held{near.motion.fixed, near.motion.between_fixed};
+    point_triangle_.clear();
+    edge_edge_.clear();
+    ask(near, {boxes_.points().box, boxes_.points().count}, triangles_.index(),
+        kernels::PairPointTriangle<Space>{surface(), held});
+    ask(near, {boxes_.edges().box, boxes_.edges().count}, edges_.index(),
+        kernels::PairEdgeEdge<Space>{surface(), held, boxes_.edges().box});
+  }
+
+  void search_strays(kernels::WithinReach<Precision, Space> const& near) {
+    compute_boxes(near);
+    points_.build(boxes_.points());
+    kernels::Held<Space> const held{near.motion.fixed, near.motion.between_fixed};
+    point_triangle_.drop(surface(), stray_);
+    edge_edge_.drop(surface(), stray_);
+    kernels::HasStray<Space, 1> const point{surface().vertex, stray_};
+    kernels::HasStray<Space, 2> const edge{surface().edge, stray_};
+    kernels::HasStray<Space, 3> const triangle{surface().triangle, stray_};
+    ask(near, askers(boxes_.points(), point), triangles_.index(),
+        kernels::PairPointTriangle<Space>{surface(), held});
+    ask(near, askers(boxes_.triangles(), triangle), points_.index(),
+        kernels::PairTrianglePoint<Space>{surface(), held, point});
+    ask(near, askers(boxes_.edges(), edge), edges_.index(),
+        kernels::PairEdgeAnew<Space>{surface(), held, edge});
+  }
+  template <class Chosen>
+  kernels::Askers<Space> askers(BoxSet<Space> const& boxes, Chosen const& chosen) const {
+    Indices const place(place_, Kokkos::make_pair(0, boxes.count));
+    int const n = exclusive_scan<Space, int>("neighbour_asks", boxes.count, chosen, place);
+    for_each<Space>("neighbour_asks", boxes.count,
+                    kernels::ListChosen<Space, Chosen>{chosen, place, asks_});
+    return {boxes.box, n, Indices(asks_, Kokkos::make_pair(0, n))};
+  }
+  template <class Index, class Pairing>
+  void ask(kernels::WithinReach<Precision, Space> const& near, kernels::Askers<Space> const& by,
+           Index const& index, Pairing const& pairing) {
+    if (by.count == 0) return;
+    auto& found = list<Pairing::kind>(*this);
+    std::int64_t const n =
+        inquiry_.ask(by, index, pairing, [&](std::int64_t room) { return found.room(room); });
+    found.append(static_cast<int>(n), surface(), filter(near), anchors_.at.from);
+  }
+
+  SurfaceBoxes<Space> boxes_;
+  Policy points_, edges_, triangles_;
+  BoxInquiry<Space> inquiry_;
+  double least_radius_ = 0;
+  Displacement reach_;
+  kernels::Anchors<Space> anchors_;
+  Reducer<Space, double> reducer_;
+  Kokkos::View<std::uint8_t*, typename Space::memory> stray_;  ///< per vertex of the mesh
+  Indices place_, asks_;
+  NeighbourList<point_triangle, Space> point_triangle_;
+  NeighbourList<edge_edge, Space> edge_edge_;
+  bool known_ = false, between_fixed_ = false;
+  FixedMask<Space> fixed_;
+  NeighbourCounters counters_;
+};
+
+}  // namespace taut
