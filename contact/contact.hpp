@@ -91,7 +91,7 @@ public:
   double quadratic_form(Positions const& x, Vectors const& p, double scale) const {
     if (!state_->complete(x)) return 0;
     using Kernel = kernels::PairForm<Pair, Precision, Space>;
-    return scale * state_->table.sum("contact_form", Kernel{pairs(), x, p});
+    return scale * state_->table.sum("contact_form", Kernel{pairs(), x, p, state_->table.known(x)});
   }
 
   void add_gradient(Positions const& x, double scale, Fixed const& fixed, Vectors const& g) const {
@@ -349,6 +349,7 @@ private:
     using Kernel = kernels::PairGradient<Pair, Precision, Space, numbers>;
     auto const slots = state_->table.slots(numbers);
     for_each<Space>("contact_gradient", pairs().count, Kernel{{pairs(), x, {}, 0, slots}});
+    state_->table.filled_at(x);
     state_->table.template gather<numbers>(slots, scale, fixed, g, c);
   }
   template <int numbers, class CurvatureField>
@@ -359,6 +360,7 @@ private:
     auto const slots = state_->table.slots(numbers);
     double const change =
         state_->table.sum("contact_gradient_after", Kernel{{pairs(), x, p, alpha, slots}});
+    state_->table.filled_at(x);
     state_->table.template gather<numbers>(slots, scale, fixed, g, c);
     return scale * change;
   }

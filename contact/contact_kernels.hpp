@@ -172,9 +172,21 @@ template <class Precision, class S>
 struct ContactSlots {
   using Real = typename Precision::real;
   Kokkos::View<std::uint8_t*, typename S::memory> acts;  ///< per pair
+  Array<Real, S> over_gradient;                          ///< per pair that acts, see form_factor
   VectorField<Real, S> vector;
   BlockField<Real, S> curvature;
 };
+
+/// The f of a pair whose Hessian is f g g', g its gradient; below zero where it is not.
+template <class Pair, class T>
+KOKKOS_INLINE_FUNCTION T form_factor(PairState<T> const& s) {
+  if constexpr (requires { Pair::Curvature::over_gradient(s); }) {
+    T const f = Pair::Curvature::over_gradient(s);
+    return f < Kokkos::Experimental::finite_max_v<T> ? f : T(-1);
+  } else {
+    return T(-1);
+  }
+}
 
 template <class Pair, class Precision, class S, int numbers>
 struct EvaluatePair {
@@ -202,6 +214,7 @@ struct EvaluatePair {
     auto const s = pairs.template evaluate<Pair>(k, y);
     bool const acts = s.at.distance < s.activation;
     to.acts(k) = acts ? 1 : 0;
+    if (acts) to.over_gradient(k) = form_factor<Pair>(s);
     for (int a = 0; acts && a < 4; ++a) {
       Vec3<Real> const g = Pair::gradient(s, a);
       for (int c = 0; c < 3; ++c) to.vector(4 * k + a, c) = g[c];
@@ -232,13 +245,30 @@ struct PairGradientAfter : EvaluatePair<Pair, Precision, S, numbers> {
   }
 };
 
+/// p'Hp of each pair at x.
 template <class Pair, class Precision, class S>
 struct PairForm {
   using Real = typename Precision::real;
   PairTable<Precision, S> pairs;
   VectorField<typename Precision::position, S> x;
   VectorField<Real, S> p;
+  ContactSlots<Precision, S> known;  ///< of a gradient at x; empty: none is known
   [[gnu::noinline]] KOKKOS_FUNCTION double form(int k) const {
+    bool const evaluated = known.acts.extent(0) > 0;
+    if (evaluated && known.acts(k) == 0) return 0;
+    if (evaluated && known.over_gradient(k) >= 0) {
+      // The four gradients add up to nothing.
+      double change = 0;
+      int const base = pairs.vertex(k, 1);
+      for (int a = 0; a < 4; ++a) {
+        int const v = pairs.vertex(k, a);
+        if (a == 1) continue;
+        for (int c = 0; c < 3; ++c) {
+          change += double(known.vector(4 * k + a, c)) * (double(p(v, c)) - double(p(base, c)));
+        }
+      }
+      return double(known.over_gradient(k)) * change * change;
+    }
     PairState<Real> s;
     if (!pairs.template acting<Pair>(k, x, s)) return 0;
     Vec3<double> step[4];
@@ -250,6 +280,20 @@ struct PairForm {
   }
   KOKKOS_FUNCTION void operator()(int k, Sums<double, 1>& sum) const {
     if (!pairs.idle(k)) sum[0] += form(k);
+  }
+};
+
+/// Lowers to the first vertex of the surface whose places differ.
+template <class Precision, class S>
+struct FindOtherPlace {
+  using Positions = VectorField<typename Precision::position, S>;
+  typename SurfaceViews<S>::Indices vertex;
+  Positions x, y;
+  KOKKOS_FUNCTION void operator()(int i, int& first) const {
+    int const v = vertex(i);
+    bool same = true;
+    for (int c = 0; c < 3; ++c) same = same && x(v, c) == y(v, c);
+    if (!same) first = Kokkos::min(first, i);
   }
 };
 

@@ -72,13 +72,17 @@ public:
   kernels::PairTable<Precision, S> const& pairs() const { return pairs_; }
 
   /// Leaves out pairs of idle vertices; nothing if the mask is empty.
-  void set_idle(IdleMask<S> const& idle) { pairs_.resting = idle; }
+  void set_idle(IdleMask<S> const& idle) {
+    pairs_.resting = idle;
+    filled_ = false;
+  }
   /// Adds p'Hp of each pair to one of its vertices (contact_islands.hpp).
   template <class Shares>
   void add_form_shares(Positions const& x, Vectors const& p, double scale,
                        FixedMask<S> const& fixed, Array<double, S> const& shares) const {
-    for_each<S>("contact_shares", surface_.vertices(),
-                Shares{surface_.vertex, {begin_, slot_}, {pairs_, x, p}, fixed, scale, shares});
+    for_each<S>(
+        "contact_shares", surface_.vertices(),
+        Shares{surface_.vertex, {begin_, slot_}, {pairs_, x, p, known(x)}, fixed, scale, shares});
   }
 
   void set_vertex_stiffness(Array<Real, S> const& stiffness) {
@@ -115,6 +119,7 @@ public:
           Rule::name);
     }
     taken_ = 0;  // should it throw
+    filled_ = false;
     std::int64_t const count =
         std::int64_t(candidates.point_triangle.count()) + candidates.edge_edge.count();
     if (count > std::numeric_limits<int>::max() / 8) {
@@ -136,13 +141,28 @@ public:
     return reducer_.template sum<1>(name, pairs_.count, kernel)[0];
   }
 
-  /// For gradients with `numbers` of curvature per vertex.
+  /// For gradients with `numbers` of curvature per vertex. What was in them is lost.
   Slots slots(int numbers) {
+    filled_ = false;
     if (numbers > 0 && slots_.curvature.extent(0) < slots_.vector.extent(0)) {
       slots_.curvature = {};
       slots_.curvature = BlockField<Real, S>(unset("contact_curvature"), slots_.vector.extent(0));
     }
     return slots_;
+  }
+  /// Says that the slots hold the gradient at x.
+  void filled_at(Positions const& x) {
+    if (at_.extent(0) != x.extent(0)) at_ = Positions("contact_at", x.extent(0));
+    assign_on<S>(at_, x);
+    filled_ = true;
+  }
+  /// The slots, if they hold the gradient at x; else none.
+  Slots known(Positions const& x) const {
+    int const n = surface_.vertices();
+    using Find = kernels::FindOtherPlace<Precision, S>;
+    bool const same =
+        filled_ && minimum<S>("contact_same", n, n, Find{surface_.vertex, x, at_}) == n;
+    return same ? slots_ : Slots();
   }
   /// Adds up the slots of each vertex.
   template <int numbers, class CurvatureField>
@@ -207,6 +227,7 @@ private:
     pairs_.mollifier = Array<Real, S>(unset("contact_mollifier"), n);
     pairs_.clearance = Array<float, S>(unset("contact_clearance"), n);
     slots_.acts = Flags(unset("contact_acts"), n);
+    slots_.over_gradient = Array<Real, S>(unset("contact_over_gradient"), n);
     slots_.vector = Vectors(unset("contact_slots"), 4 * n);
     slot_ = Indices(unset("contact_slot"), 4 * n);
     vertex_of_slot_ = Indices(unset("contact_slot_vertex"), 4 * n);
@@ -236,6 +257,8 @@ private:
   Reducer<S, double> reducer_;
   std::vector<int> elements_;
   std::int64_t taken_ = 0;  ///< the search; 0: none
+  bool filled_ = false;     ///< the slots hold the gradient at at_
+  Positions at_;
 };
 
 }  // namespace taut

@@ -189,6 +189,13 @@ struct GaussNewtonCurvature {
            f.second(1, 1) * square(closing) + f.across * across;
   }
 
+  /// H over g g', g = dE/dy; -1 where it is not of that kind. Not finite where the force is next to
+  /// nothing.
+  template <class T>
+  KOKKOS_INLINE_FUNCTION static T over_gradient(PairState<T> const& s) {
+    return s.m.active ? T(-1) : s.b2 / square(s.b1);
+  }
+
   template <class T>
   KOKKOS_INLINE_FUNCTION static Mat3<T> block(PairState<T> const& s, int a, int b) {
     T const ca = s.at.c[a], cb = s.at.c[b];
