@@ -205,7 +205,7 @@ struct Normalised {
 private:
   template <class T>
   KOKKOS_FORCEINLINE_FUNCTION static constexpr T factor() {
-    return static_cast<T>(1 / B::curvature_at_half);
+    return T(static_cast<ValueType<T>>(1 / B::curvature_at_half));
   }
 };
 
@@ -222,7 +222,11 @@ template <class T>
 KOKKOS_FORCEINLINE_FUNCTION RelativeDistance<T> relative_distance(T d, T activation) {
   T const x = d / activation, room = (activation - d) / activation;
   // Each logarithm where its argument is exact: activation - d has no error from D/2 on.
-  return {x, room, x < T(0.5) ? log(x) : log1p(-room)};
+  if constexpr (is_pack<T>) {
+    return {x, room, select(x < T(0.5), log(x), log1p(T(-room)))};
+  } else {
+    return {x, room, x < T(0.5) ? log(x) : log1p(-room)};
+  }
 }
 }  // namespace kernels
 
@@ -230,21 +234,39 @@ KOKKOS_FORCEINLINE_FUNCTION RelativeDistance<T> relative_distance(T d, T activat
 /// infinite, and their derivatives infinite or not a number.
 template <Barrier B, class T>
 KOKKOS_INLINE_FUNCTION BarrierValues<T> evaluate_barrier(T d, T activation) {
-  if (!(d < activation)) return {T(0), T(0), T(0)};
+  if constexpr (!is_pack<T>) {
+    if (!(d < activation)) return {T(0), T(0), T(0)};
+  }
   auto const s = kernels::relative_distance(d, activation);
-  return {square(activation) * B::value(s), activation * B::slope(s), B::curvature(s)};
+  BarrierValues<T> r{square(activation) * B::value(s), activation * B::slope(s), B::curvature(s)};
+  if constexpr (is_pack<T>) {
+    for (T* value : {&r.value, &r.slope, &r.curvature})
+      *value = select(d < activation, *value, T(0));
+  }
+  return r;
 }
 
 /// b(after) - b(before) with an error relative to itself. `step` is after - before, which the
 /// caller knows better than the rounded distances do.
 template <Barrier B, class T>
 KOKKOS_INLINE_FUNCTION T barrier_change(T before, T after, T step, T activation) {
-  if (!(before < activation)) return evaluate_barrier<B>(after, activation).value;
-  if (!(after < activation)) return -evaluate_barrier<B>(before, activation).value;
-  T const log_ratio = step > T(0) ? log1p(step / before) : -log1p(-step / after);
-  return square(activation) * B::change(kernels::relative_distance(before, activation),
-                                        kernels::relative_distance(after, activation),
-                                        RelativeStep<T>{step / activation, log_ratio});
+  if constexpr (!is_pack<T>) {
+    if (!(before < activation)) return evaluate_barrier<B>(after, activation).value;
+    if (!(after < activation)) return -evaluate_barrier<B>(before, activation).value;
+  }
+  auto const from = kernels::relative_distance(before, activation);
+  auto const to = kernels::relative_distance(after, activation);
+  auto const opens = step > T(0);
+  T const log_ratio = log1p(select(opens, T(step / before), T(-step / after)));
+  T const change = B::change(
+      from, to, RelativeStep<T>{step / activation, select(opens, log_ratio, T(-log_ratio))});
+  if constexpr (is_pack<T>) {
+    T const gained = select(after < activation, B::value(to), T(0));
+    T const lost = select(after < activation, change, T(-B::value(from)));
+    return square(activation) * select(before < activation, lost, gained);
+  } else {
+    return square(activation) * change;
+  }
 }
 
 }  // namespace taut

@@ -55,10 +55,14 @@ struct ClosestPoints {
 
 namespace kernels {
 
+/// What comparing two T gives: bool, or a mask of lanes.
+template <class T>
+using MaskOf = decltype(T() < T());
+
 /// min over x of |b - x1 e1 - x2 e2|, by modified Gram-Schmidt.
 template <class T>
 struct LeastSquares {
-  bool regular;  ///< e1 and e2 are not parallel to round-off; only then is there an answer
+  MaskOf<T> regular;  ///< e1 and e2 are not parallel to round-off; only then is there an answer
   T x1, x2;
 };
 
@@ -67,16 +71,15 @@ KOKKOS_INLINE_FUNCTION LeastSquares<T> least_squares(Vec3<T> const& b, Vec3<T> c
                                                      Vec3<T> const& e2) {
   // Below this sine e1 and e2 are parallel after a change of either by round-off, and the closest
   // points may be taken at an end.
-  constexpr T parallel = 4 * Kokkos::Experimental::epsilon_v<T>;
+  constexpr auto parallel = 4 * Kokkos::Experimental::epsilon_v<ValueType<T>>;
   T const e11 = dot(e1, e1);
-  if (!(e11 > T(0))) return {false, T(0), T(0)};
   T const r = dot(e1, e2) / e11;
   Vec3<T> const q = e2 - r * e1;
   T const qq = dot(q, q);
-  if (!(qq > square(parallel) * dot(e2, e2))) return {false, T(0), T(0)};
   T const s = dot(e1, b) / e11;
   T const x2 = dot(q, b - s * e1) / qq;
-  return {true, s - r * x2, x2};
+  // A comparison with what is not a number fails.
+  return {e11 > T(0) && qq > T(square(parallel)) * dot(e2, e2), s - r * x2, x2};
 }
 
 /// The nearest point s e, 0 <= s <= 1, of a segment to b.
@@ -85,14 +88,14 @@ struct Foot {
   T s;
   Vec3<T> t;  ///< b - s e
   T t2;       ///< |t|^2
-  KOKKOS_FORCEINLINE_FUNCTION bool inside() const { return s > T(0) && s < T(1); }
+  KOKKOS_FORCEINLINE_FUNCTION MaskOf<T> inside() const { return s > T(0) && s < T(1); }
 };
 
 template <class T>
 KOKKOS_INLINE_FUNCTION Foot<T> foot_on_segment(Vec3<T> const& b, Vec3<T> const& e) {
   T const ee = dot(e, e), be = dot(b, e);
-  T const s = be > T(0) ? (be < ee ? be / ee : T(1)) : T(0);
-  Vec3<T> const t = s < T(1) ? b - s * e : b - e;
+  T const s = select(be > T(0), select(be < ee, T(be / ee), T(1)), T(0));
+  Vec3<T> const t = b - s * e;
   return {s, t, dot(t, t)};
 }
 
@@ -100,10 +103,79 @@ KOKKOS_INLINE_FUNCTION Foot<T> foot_on_segment(Vec3<T> const& b, Vec3<T> const& 
 /// which is the foot on a neighbour, have distances that agree to second order: the inside is right
 /// there, and gives the direction to full accuracy, but round-off could prefer the end.
 template <class T>
-KOKKOS_INLINE_FUNCTION bool nearer(Foot<T> const& a, Foot<T> const& b) {
-  constexpr T tie = 1 - 16 * Kokkos::Experimental::epsilon_v<T>;
-  if (a.inside() == b.inside()) return a.t2 < b.t2;
-  return a.inside() ? tie * a.t2 < b.t2 : a.t2 < tie * b.t2;
+KOKKOS_INLINE_FUNCTION MaskOf<T> nearer(Foot<T> const& a, Foot<T> const& b) {
+  constexpr auto tie = 1 - 16 * Kokkos::Experimental::epsilon_v<ValueType<T>>;
+  auto const a_inside = a.inside(), b_inside = b.inside();
+  return select(a_inside && !b_inside, T(tie), T(1)) * a.t2 <
+         select(b_inside && !a_inside, T(tie), T(1)) * b.t2;
+}
+
+template <class T>
+KOKKOS_FORCEINLINE_FUNCTION Vec3<T> select_vector(MaskOf<T> const& mask, Vec3<T> const& a,
+                                                  Vec3<T> const& b) {
+  return {select(mask, a[0], b[0]), select(mask, a[1], b[1]), select(mask, a[2], b[2])};
+}
+
+/// Takes over t and c of `other` in the lanes of a mask.
+template <class T>
+KOKKOS_FORCEINLINE_FUNCTION void replace(MaskOf<T> const& mask, ClosestPoints<T> const& other,
+                                         ClosestPoints<T>& r) {
+  r.t = select_vector(mask, other.t, r.t);
+  for (int a = 0; a < 4; ++a) r.c[a] = select(mask, other.c[a], r.c[a]);
+}
+
+/// The closest points of a pair per lane, without branches. They tell no features but the interior.
+template <class T>
+KOKKOS_INLINE_FUNCTION ClosestPoints<T> closest_points_of_lanes(PairKind kind,
+                                                                Vec3<T> const (&y)[4]) {
+  bool const edges = kind == PairKind::edge_edge;
+  // Of the feet, in the order in which the scalars take them: the vertex that is projected, and the
+  // edge.
+  constexpr int foot_of[2][4] = {{0, 0, 0, 0}, {0, 1, 2, 3}};
+  constexpr int edge_of[2][4][2] = {{{1, 2}, {2, 3}, {3, 1}, {3, 1}},
+                                    {{2, 3}, {2, 3}, {0, 1}, {0, 1}}};
+  ClosestPoints<T> r{};
+  Foot<T> nearest{};
+  for (int k = 0; k < (edges ? 4 : 3); ++k) {
+    int const v = foot_of[edges][k], from = edge_of[edges][k][0], to = edge_of[edges][k][1];
+    T const sign = v < (edges ? 2 : 1) ? T(1) : T(-1);
+    auto const foot = foot_on_segment(y[v] - y[from], y[to] - y[from]);
+    ClosestPoints<T> at{};
+    at.t = sign * foot.t;
+    at.c[v] = sign;
+    at.c[from] = sign * (foot.s - T(1));
+    at.c[to] = -(sign * foot.s);
+    if (k == 0) {
+      r = at;
+      nearest = foot;
+    } else {
+      auto const better = nearer(foot, nearest);
+      replace(better, at, r);
+      nearest.s = select(better, foot.s, nearest.s);
+      nearest.t2 = select(better, foot.t2, nearest.t2);
+    }
+  }
+  r.distance = sqrt(nearest.t2);
+
+  ClosestPoints<T> inner{};
+  MaskOf<T> inside;
+  if (edges) {
+    Vec3<T> const b = y[0] - y[2], e1 = y[0] - y[1], e2 = y[3] - y[2];
+    auto const [regular, s, u] = least_squares(b, e1, e2);
+    inside = regular && s > T(0) && s < T(1) && u > T(0) && u < T(1);
+    inner.t = b - s * e1 - u * e2;
+    inner.c[0] = T(1) - s, inner.c[1] = s, inner.c[2] = u - T(1), inner.c[3] = -u;
+  } else {
+    Vec3<T> const b = y[0] - y[1], e1 = y[2] - y[1], e2 = y[3] - y[1];
+    auto const [regular, w1, w2] = least_squares(b, e1, e2);
+    inside = regular && w1 > T(0) && w2 > T(0) && w1 + w2 < T(1);
+    inner.t = b - w1 * e1 - w2 * e2;
+    inner.c[0] = T(1), inner.c[1] = w1 + w2 - T(1), inner.c[2] = -w1, inner.c[3] = -w2;
+  }
+  replace(inside, inner, r);
+  r.distance = select(inside, norm(inner.t), r.distance);
+  r.feature = edges ? Feature::edge_edge : Feature::face;
+  return r;
 }
 
 }  // namespace kernels
@@ -174,10 +246,14 @@ KOKKOS_INLINE_FUNCTION ClosestPoints<T> closest_edge_edge(Vec3<T> const (&y)[4])
   return r;
 }
 
-/// Of either kind.
+/// Of either kind. In packs, `feature` says no more than the kind.
 template <class T>
 KOKKOS_INLINE_FUNCTION ClosestPoints<T> closest_points(PairKind kind, Vec3<T> const (&y)[4]) {
-  return kind == PairKind::edge_edge ? closest_edge_edge(y) : closest_point_triangle(y);
+  if constexpr (is_pack<T>) {
+    return kernels::closest_points_of_lanes(kind, y);
+  } else {
+    return kind == PairKind::edge_edge ? closest_edge_edge(y) : closest_point_triangle(y);
+  }
 }
 
 /// Between the boxes around the two primitives, squared: no more than their distance, for little.

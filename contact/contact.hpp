@@ -348,7 +348,8 @@ private:
     if (!state_->complete(x)) return;
     using Kernel = kernels::PairGradient<Pair, Precision, Space, numbers>;
     auto const slots = state_->table.slots(numbers);
-    for_each<Space>("contact_gradient", pairs().count, Kernel{{pairs(), x, {}, 0, slots}});
+    Kernel const kernel{{pairs(), x, {}, 0, slots}};
+    for_each<Space>("contact_gradient", kernel.packs(), kernel);
     state_->table.filled_at(x);
     state_->table.template gather<numbers>(slots, scale, fixed, g, c);
   }
@@ -358,8 +359,8 @@ private:
     if (!state_->complete(x, p, -alpha)) return 0;
     using Kernel = kernels::PairGradientAfter<Pair, Precision, Space, numbers>;
     auto const slots = state_->table.slots(numbers);
-    double const change =
-        state_->table.sum("contact_gradient_after", Kernel{{pairs(), x, p, alpha, slots}});
+    Kernel const kernel{{pairs(), x, p, alpha, slots}};
+    double const change = state_->table.sum("contact_gradient_after", kernel.packs(), kernel);
     state_->table.filled_at(x);
     state_->table.template gather<numbers>(slots, scale, fixed, g, c);
     return scale * change;

@@ -188,20 +188,54 @@ KOKKOS_INLINE_FUNCTION T form_factor(PairState<T> const& s) {
   }
 }
 
+/// Pairs that are evaluated side by side: one per lane of a register of the host, where curvature
+/// and barrier are arithmetic without branches.
+template <class Pair, class Precision, class S>
+using PairLanes = std::conditional_t < S::on_host&& requires {
+  Pair::Curvature::in_packs;
+}
+, HostPack<typename Precision::real>, typename Precision::real > ;
+
 template <class Pair, class Precision, class S, int numbers>
 struct EvaluatePair {
   using Real = typename Precision::real;
+  using Lanes = PairLanes<Pair, Precision, S>;
+  static constexpr int lanes = ScalarTraits<Lanes>::lanes;
+
   PairTable<Precision, S> pairs;
   VectorField<typename Precision::position, S> x;
   VectorField<Real, S> p;  ///< of the step that led to x
   double alpha;
   ContactSlots<Precision, S> to;
 
+  /// Registers full of pairs, those of points and triangles first.
+  int packs() const {
+    return packs(pairs.point_triangles) + packs(pairs.count - pairs.point_triangles);
+  }
+  KOKKOS_FUNCTION static int packs(int count) { return (count + lanes - 1) / lanes; }
+
+  /// Leaves what the pairs of pack g add; the change of energy if `after_step`.
+  KOKKOS_FUNCTION double evaluate_pack(int g, bool after_step) const {
+    if constexpr (lanes == 1) {
+      return evaluate_unless_idle(g, after_step);
+    } else {
+      int const of_points = packs(pairs.point_triangles);
+      if (g < of_points) {
+        int const first = lanes * g;
+        return side_by_side<PairKind::point_triangle>(first, pairs.point_triangles - first,
+                                                      after_step);
+      }
+      int const first = pairs.point_triangles + lanes * (g - of_points);
+      return side_by_side<PairKind::edge_edge>(first, pairs.count - first, after_step);
+    }
+  }
+
+private:
   /// A pair that is idle only leaves that it does not act.
-  KOKKOS_FUNCTION bool passed(int k) const {
-    bool const idle = pairs.idle(k);
-    if (idle) to.acts(k) = 0;
-    return idle;
+  KOKKOS_FUNCTION double evaluate_unless_idle(int k, bool after_step) const {
+    if (!pairs.idle(k)) return evaluate(k, after_step);
+    to.acts(k) = 0;
+    return 0;
   }
   [[gnu::noinline]] KOKKOS_FUNCTION double evaluate(int k, bool after_step) const {
     Vec3<double> y[4], step[4];
@@ -214,34 +248,121 @@ struct EvaluatePair {
     auto const s = pairs.template evaluate<Pair>(k, y);
     bool const acts = s.at.distance < s.activation;
     to.acts(k) = acts ? 1 : 0;
-    if (acts) to.over_gradient(k) = form_factor<Pair>(s);
-    for (int a = 0; acts && a < 4; ++a) {
-      Vec3<Real> const g = Pair::gradient(s, a);
-      for (int c = 0; c < 3; ++c) to.vector(4 * k + a, c) = g[c];
-      if constexpr (numbers == 3) {
-        Vec3<Real> const h = Pair::diagonal(s, a);
-        for (int c = 0; c < 3; ++c) to.curvature(4 * k + a, c) = h[c];
-      }
-      if constexpr (numbers == 6) {
-        Sym3<Real> const h = Pair::block(s, a);
-        for (int c = 0; c < 6; ++c) to.curvature(4 * k + a, c) = h.s[c];
-      }
+    if (acts) {
+      to.over_gradient(k) = form_factor<Pair>(s);
+      Real gradient[12], curvature[numbers > 0 ? 4 * numbers : 1];
+      contributions(s, gradient, curvature);
+      write(k, gradient, curvature, 1);
     }
     return after_step ? change_of_pair<Pair>(pairs.kind(k), pairs.parameters(k), s, step) : 0;
+  }
+
+  /// Of all four vertices, one after the other.
+  template <class T>
+  KOKKOS_FORCEINLINE_FUNCTION static void contributions(PairState<T> const& s, T* gradient,
+                                                        T* curvature) {
+    for (int a = 0; a < 4; ++a) {
+      Vec3<T> const g = Pair::gradient(s, a);
+      for (int c = 0; c < 3; ++c) gradient[3 * a + c] = g[c];
+      if constexpr (numbers == 3) {
+        Vec3<T> const h = Pair::diagonal(s, a);
+        for (int c = 0; c < 3; ++c) curvature[3 * a + c] = h[c];
+      }
+      if constexpr (numbers == 6) {
+        Sym3<T> const h = Pair::block(s, a);
+        for (int c = 0; c < 6; ++c) curvature[6 * a + c] = h.s[c];
+      }
+    }
+  }
+  /// Numbers that are `stride` apart, to the slots of pair k.
+  KOKKOS_FORCEINLINE_FUNCTION void write(int k, Real const* gradient, Real const* curvature,
+                                         int stride) const {
+    for (int a = 0; a < 4; ++a) {
+      for (int c = 0; c < 3; ++c) to.vector(4 * k + a, c) = gradient[stride * (3 * a + c)];
+      for (int c = 0; c < numbers; ++c) {
+        to.curvature(4 * k + a, c) = curvature[stride * (numbers * a + c)];
+      }
+    }
+  }
+
+  /// Pairs first, first + 1, ... of one kind, of which there are `left`.
+  template <PairKind kind>
+  [[gnu::noinline]] double side_by_side(int first, int left, bool after_step) const {
+    using T = Lanes;
+    int k[lanes], v[4][lanes];
+    bool looked_at[lanes], any = false;
+    for (int i = 0; i < lanes; ++i) {
+      k[i] = first + (i < left ? i : 0);
+      looked_at[i] = i < left && !pairs.idle(k[i]);
+      any = any || looked_at[i];
+      if (i < left) to.acts(k[i]) = 0;
+      for (int a = 0; a < 4; ++a) v[a][i] = pairs.vertex(k[i], a);
+    }
+    if (!any) return 0;
+    PairParameters<T> const parameters{gather<T>(pairs.stiffness.data(), k),
+                                       gather<T>(pairs.activation.data(), k),
+                                       gather<T>(pairs.mollifier.data(), k)};
+    Vec3<T> y[4], step[4];
+    for (int a = 0; a < 4; ++a)
+      for (int c = 0; c < 3; ++c) {
+        y[a][c] =
+            T([&](std::size_t i) { return static_cast<Real>(x(v[a][i], c) - x(v[1][i], c)); });
+        if (after_step) {
+          step[a][c] = T([&](std::size_t i) {
+            return static_cast<Real>(alpha * (double(p(v[a][i], c)) - double(p(v[1][i], c))));
+          });
+        }
+      }
+    auto const s =
+        evaluate_local<typename Pair::Barrier, typename Pair::Mollifier>(kind, parameters, y);
+
+    // What is mollified goes by itself, and so does what has no direction.
+    auto odd = !(s.at.distance > T(0));
+    if constexpr (kind == PairKind::edge_edge) {
+      odd = odd || Pair::Mollifier::acts(y, parameters.mollifier_scale);
+      if (after_step) {
+        Vec3<T> before[4];
+        for (int a = 0; a < 4; ++a) before[a] = y[a] - step[a];
+        odd = odd || Pair::Mollifier::acts(before, parameters.mollifier_scale);
+      }
+    }
+    T gradient[12], curvature[numbers > 0 ? 4 * numbers : 1];
+    contributions(s, gradient, curvature);
+    alignas(64) Real g[12][lanes], h[numbers > 0 ? 4 * numbers : 1][lanes], f[lanes], change[lanes],
+        acts[lanes], by_itself[lanes];
+    for (int n = 0; n < 12; ++n) store(gradient[n], g[n]);
+    for (int n = 0; n < 4 * numbers; ++n) store(curvature[n], h[n]);
+    store(Pair::Curvature::over_gradient(s), f);
+    store(after_step ? Pair::change(kind, parameters, s, step) : T(0), change);
+    store(select(s.at.distance < s.activation, T(1), T(0)), acts);
+    store(select(odd, T(1), T(0)), by_itself);
+
+    double sum = 0;
+    for (int i = 0; i < lanes; ++i) {
+      if (!looked_at[i]) continue;
+      if (by_itself[i] != 0) {
+        sum += evaluate(k[i], after_step);
+        continue;
+      }
+      sum += double(change[i]);
+      if (acts[i] == 0) continue;
+      to.acts(k[i]) = 1;
+      to.over_gradient(k[i]) = f[i] < Kokkos::Experimental::finite_max_v<Real> ? f[i] : Real(-1);
+      write(k[i], &g[0][i], &h[0][i], lanes);
+    }
+    return sum;
   }
 };
 
 template <class Pair, class Precision, class S, int numbers>
 struct PairGradient : EvaluatePair<Pair, Precision, S, numbers> {
-  KOKKOS_FUNCTION void operator()(int k) const {
-    if (!this->passed(k)) this->evaluate(k, false);
-  }
+  KOKKOS_FUNCTION void operator()(int g) const { this->evaluate_pack(g, false); }
 };
 /// And E(x) - E(x - alpha p).
 template <class Pair, class Precision, class S, int numbers>
 struct PairGradientAfter : EvaluatePair<Pair, Precision, S, numbers> {
-  KOKKOS_FUNCTION void operator()(int k, Sums<double, 1>& sum) const {
-    if (!this->passed(k)) sum[0] += this->evaluate(k, true);
+  KOKKOS_FUNCTION void operator()(int g, Sums<double, 1>& sum) const {
+    sum[0] += this->evaluate_pack(g, true);
   }
 };
 

@@ -136,9 +136,14 @@ public:
     taken_ = search;
   }
 
+  /// Over all pairs, or over n packs of them.
   template <class Kernel>
   double sum(char const* name, Kernel const& kernel) const {
-    return reducer_.template sum<1>(name, pairs_.count, kernel)[0];
+    return sum(name, pairs_.count, kernel);
+  }
+  template <class Kernel>
+  double sum(char const* name, int n, Kernel const& kernel) const {
+    return reducer_.template sum<1>(name, n, kernel)[0];
   }
 
   /// For gradients with `numbers` of curvature per vertex. What was in them is lost.

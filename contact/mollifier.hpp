@@ -53,6 +53,12 @@ struct EdgeMollifier {
                                         T threshold = T(default_threshold)) {
     return T(1) / (sqrt(threshold) * norm(rest[1] - rest[0]) * norm(rest[3] - rest[2]));
   }
+  /// Whether m is less than 1, in each lane.
+  template <class T>
+  KOKKOS_INLINE_FUNCTION static auto acts(Vec3<T> const (&y)[4], T scale) {
+    Vec3<T> const w = scale * cross(y[1] - y[0], y[3] - y[2]);
+    return dot(w, w) < T(1);
+  }
   template <class T>
   KOKKOS_INLINE_FUNCTION static Mollification<T> evaluate(Vec3<T> const (&y)[4], T scale) {
     Vec3<T> const u = y[1] - y[0], v = y[3] - y[2], w = scale * cross(u, v);
@@ -68,6 +74,10 @@ struct NoMollifier {
   template <class T>
   KOKKOS_FORCEINLINE_FUNCTION static T scale(Vec3<T> const (&)[4], T = T(0)) {
     return T(0);
+  }
+  template <class T>
+  KOKKOS_FORCEINLINE_FUNCTION static auto acts(Vec3<T> const (&)[4], T) {
+    return T(0) > T(0);
   }
   template <class T>
   KOKKOS_FORCEINLINE_FUNCTION static Mollification<T> evaluate(Vec3<T> const (&)[4], T) {

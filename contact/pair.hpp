@@ -46,7 +46,11 @@ struct PairEnergy {
     T const db = parameters.stiffness *
                  barrier_change<Barrier>(before.at.distance, after.at.distance,
                                          distance_change(before, after, step), after.activation);
-    return after.m.value * db + mollifier_change(before.m, after.m, step) * before.b;
+    if constexpr (is_pack<T>) {
+      return db;
+    } else {
+      return after.m.value * db + mollifier_change(before.m, after.m, step) * before.b;
+    }
   }
 
   /// dE/dy_a, N.
@@ -69,7 +73,11 @@ struct PairEnergy {
   template <class T>
   KOKKOS_INLINE_FUNCTION static Sym3<T> block(PairState<T> const& s, int a) {
     Sym3<T> const h = symmetric_part(Curvature::block(s, a, a));
-    return Curvature::positive ? h : project_psd(h);
+    if constexpr (Curvature::positive) {
+      return h;
+    } else {
+      return project_psd(h);
+    }
   }
 
   /// p'Hp, not negative, J for p in m.

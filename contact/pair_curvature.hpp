@@ -176,6 +176,7 @@ struct ExactCurvature : kernels::SecondDerivative<true> {
 struct GaussNewtonCurvature {
   static constexpr char const* name = "gauss_newton";
   static constexpr bool positive = true;
+  static constexpr bool in_packs = true;  ///< for pairs that no mollifier acts on
 
   template <class T>
   KOKKOS_INLINE_FUNCTION static T form(PairState<T> const& s, Vec3<T> const (&p)[4]) {
@@ -199,7 +200,16 @@ struct GaussNewtonCurvature {
   template <class T>
   KOKKOS_INLINE_FUNCTION static Mat3<T> block(PairState<T> const& s, int a, int b) {
     T const ca = s.at.c[a], cb = s.at.c[b];
-    if (!s.m.active) return (ca * cb * s.b2) * outer(s.n, s.n);
+    if constexpr (!is_pack<T>) {
+      if (s.m.active) return mollified_block(s, a, b);
+    }
+    return (ca * cb * s.b2) * outer(s.n, s.n);
+  }
+
+private:
+  template <class T>
+  KOKKOS_INLINE_FUNCTION static Mat3<T> mollified_block(PairState<T> const& s, int a, int b) {
+    T const ca = s.at.c[a], cb = s.at.c[b];
     auto const f = reduced(s);
     Vec3<T> const wa = cross(f.w, s.m.arm(a)), wb = cross(f.w, s.m.arm(b));
     Vec3<T> const na = (ca / s.activation) * s.n, nb = (cb / s.activation) * s.n;
@@ -208,7 +218,6 @@ struct GaussNewtonCurvature {
            f.across * kernels::cross_product_form(s.m.arm(a), s.m.arm(b));
   }
 
-private:
   /// F(|w|, d / D): its projected second derivative, and its curvature across w.
   template <class T>
   struct Reduced {

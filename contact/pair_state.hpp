@@ -36,13 +36,16 @@ KOKKOS_INLINE_FUNCTION PairState<T> evaluate_local(PairKind kind,
   PairState<T> s;
   for (int a = 0; a < 4; ++a) s.y[a] = y[a];
   s.at = closest_points(kind, y);
-  s.n = (s.at.distance > T(0) ? T(1) / s.at.distance : T(0)) * s.at.t;
+  s.n = select(s.at.distance > T(0), T(T(1) / s.at.distance), T(0)) * s.at.t;
   s.activation = parameters.activation;
   auto const b = evaluate_barrier<B>(s.at.distance, s.activation);
   s.b = parameters.stiffness * b.value;
   s.b1 = parameters.stiffness * b.slope;
   s.b2 = parameters.stiffness * b.curvature;
-  if (kind == PairKind::edge_edge) s.m = M::evaluate(y, parameters.mollifier_scale);
+  // Packs are for pairs that no mollifier acts on.
+  if constexpr (!is_pack<T>) {
+    if (kind == PairKind::edge_edge) s.m = M::evaluate(y, parameters.mollifier_scale);
+  }
   return s;
 }
 }  // namespace kernels
@@ -76,7 +79,7 @@ KOKKOS_INLINE_FUNCTION T distance_change(PairState<T> const& before, PairState<T
     dt = dt + before.at.c[a] * (step[a] - step[1]) + (after.at.c[a] - before.at.c[a]) * within;
   }
   T const sum = after.at.distance + before.at.distance;
-  return sum > T(0) ? dot(dt, after.at.t + before.at.t) / sum : T(0);
+  return select(sum > T(0), T(dot(dt, after.at.t + before.at.t) / sum), T(0));
 }
 
 }  // namespace taut
