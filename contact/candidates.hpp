@@ -77,10 +77,12 @@ struct NoteFields {
   }
 };
 
+/// A filter that judges a pack of pairs at once, and notes what it has computed of those that it
+/// keeps: `judge(kind, v, y, note, keep)`, with the vertices v[a][lane].
 template <class Filter>
-concept NotingFilter = requires(Filter const& filter, int const (&v)[4], Vec3<double> const (&y)[4],
-                                PairNote& note) {
-  filter(PairKind::edge_edge, v, y, note);
+concept NotingFilter = requires(Filter const& filter, int const (&v)[4][1],
+                                Vec3<double> const (&y)[4], PairNote (&note)[1], bool (&keep)[1]) {
+  filter.judge(PairKind::edge_edge, v, y, note, keep);
 };
 
 template <class Ids>
@@ -100,27 +102,58 @@ struct ListedPairs {
   KOKKOS_FUNCTION void read(int k, int (&v)[4]) const { read_pair(ids, k, v); }
 };
 
-/// Whether pair k is kept, as 1 or 0, and what is noted of it.
+/// Whether the pairs of pack g are kept, as 1 or 0, and what is noted of them.
 template <PairKind kind, class S, class Source, class Positions, class Filter>
 struct JudgePairs {
+  using Lanes = std::conditional_t<S::on_host && NotingFilter<Filter>, HostPack<double>, double>;
+  static constexpr int lanes = ScalarTraits<Lanes>::lanes;
+
   Source pairs;
   Positions x;
   Filter filter;
+  int count;
   Kokkos::View<int*, typename S::memory> kept;
   NoteFields<S> notes;
-  KOKKOS_FUNCTION void operator()(int k) const {
-    int v[4];
-    Vec3<double> y[4];
-    pairs.read(k, v);
-    gather(v, x, y);
+
+  int packs() const { return (count + lanes - 1) / lanes; }
+  KOKKOS_FUNCTION void operator()(int g) const {
     if constexpr (NotingFilter<Filter>) {
-      PairNote note;
-      if constexpr (requires { pairs.known(k); }) note = pairs.known(k);
-      bool const keep = filter(kind, v, y, note);
-      kept(k) = keep ? 1 : 0;
-      if (keep) notes.write(k, note);
+      side_by_side(lanes * g);
     } else {
-      kept(k) = filter(kind, v, y) ? 1 : 0;
+      int v[4];
+      Vec3<double> y[4];
+      pairs.read(g, v);
+      gather(v, x, y);
+      kept(g) = filter(kind, v, y) ? 1 : 0;
+    }
+  }
+
+private:
+  KOKKOS_FUNCTION void side_by_side(int first) const {
+    int const n = Kokkos::min(lanes, count - first);
+    int v[4][lanes];
+    PairNote note[lanes];
+    for (int i = 0; i < lanes; ++i) {
+      int const k = i < n ? first + i : first;
+      int of_pair[4];
+      pairs.read(k, of_pair);
+      for (int a = 0; a < 4; ++a) v[a][i] = of_pair[a];
+      if constexpr (requires { pairs.known(k); }) note[i] = pairs.known(k);
+    }
+    Vec3<Lanes> y[4];
+    for (int a = 0; a < 4; ++a)
+      for (int c = 0; c < 3; ++c) {
+        if constexpr (is_pack<Lanes>) {
+          y[a][c] = Lanes([&](std::size_t i) { return double(x(v[a][i], c)); });
+        } else {
+          y[a][c] = double(x(v[a][0], c));
+        }
+      }
+    bool keep[lanes];
+    filter.judge(kind, v, y, note, keep);
+    for (int i = 0; i < n; ++i) {
+      kept(first + i) = keep[i] ? 1 : 0;
+      if (keep[i]) notes.write(first + i, note[i]);
     }
   }
 };
@@ -169,8 +202,8 @@ public:
     count_ = static_cast<int>(count);
   }
 
-  /// Leaves the pairs for which `filter(kind, v, y)`, or `filter(kind, v, y, note)`, says so; v are
-  /// the vertices of a pair and y is where these are at `x`.
+  /// Leaves the pairs for which `filter(kind, v, y)` says so, or a NotingFilter; v are the vertices
+  /// of a pair and y is where these are at `x`.
   template <class Filter, class Positions>
   void keep(Filter const& filter, Positions const& x) {
     std::swap(ids_, spare_);
@@ -182,9 +215,9 @@ public:
     constexpr bool notes = kernels::NotingFilter<Filter>;
     grow(place_, "candidate_place", count);
     if constexpr (notes) grow_notes(judged_, count);
-    for_each<S>(
-        "candidates_judge", count,
-        kernels::JudgePairs<kind, S, Source, Positions, Filter>{from, x, filter, place_, judged_});
+    kernels::JudgePairs<kind, S, Source, Positions, Filter> const judge{from,  x,      filter,
+                                                                        count, place_, judged_};
+    for_each<S>("candidates_judge", judge.packs(), judge);
     Kokkos::View<int*, typename S::memory> const place(place_, Kokkos::make_pair(0, count));
     int const kept = exclusive_scan<S, int>("candidates_place", place);
     grow(ids_, "candidates", kept);

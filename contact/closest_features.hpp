@@ -263,13 +263,13 @@ KOKKOS_INLINE_FUNCTION T square_box_gap(PairKind kind, Vec3<T> const (&y)[4]) {
   T sum = T(0);
   for (int c = 0; c < 3; ++c) {
     // Vertex 1 belongs to the first edge, or to the triangle.
-    T const low = Kokkos::min(y[2][c], y[3][c]), high = Kokkos::max(y[2][c], y[3][c]);
-    T const first_low = edges ? Kokkos::min(y[0][c], y[1][c]) : y[0][c];
-    T const first_high = edges ? Kokkos::max(y[0][c], y[1][c]) : y[0][c];
-    T const second_low = edges ? low : Kokkos::min(low, y[1][c]);
-    T const second_high = edges ? high : Kokkos::max(high, y[1][c]);
-    T const gap = Kokkos::max(second_low - first_high, first_low - second_high);
-    sum += gap > T(0) ? gap * gap : T(0);
+    T const low = min(y[2][c], y[3][c]), high = max(y[2][c], y[3][c]);
+    T const first_low = edges ? min(y[0][c], y[1][c]) : y[0][c];
+    T const first_high = edges ? max(y[0][c], y[1][c]) : y[0][c];
+    T const second_low = edges ? low : min(low, y[1][c]);
+    T const second_high = edges ? high : max(high, y[1][c]);
+    T const gap = max(max(T(second_low - first_high), T(first_low - second_high)), T(0));
+    sum += gap * gap;
   }
   return sum;
 }

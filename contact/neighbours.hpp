@@ -30,91 +30,119 @@ using PrimitivePairs = Kokkos::View<int* [2], typename S::layout, typename S::me
 
 namespace kernels {
 
-/// Keeps pairs that may act, or be half of dhat apart, once their distance has fallen by `reach`,
-/// or in the course of `motion`.
+/// The pairs that may act, or be half of dhat apart, once their distance has fallen by `reach`, or
+/// in the course of `motion`.
 template <class Precision, class S>
 struct WithinReach {
   Activation<S> activation;
   Displacement reach;
   Motion<Precision, S> motion;
 
-  /// Compiled once, as what contact_kernels.hpp computes: which pairs are candidates must not
-  /// depend on the number of threads.
-  [[gnu::noinline]] KOKKOS_FUNCTION bool operator()(PairKind kind, int const (&v)[4],
-                                                    Vec3<double> const (&y)[4],
-                                                    PairNote& note) const {
-    bool const one_body = activation.one_body(v);
-    return keep(kind, v, y, one_body, reach_of(one_body, v, y), note);
-  }
-  /// Of a pair whose distance may fall by `far`.
-  KOKKOS_FUNCTION bool keep(PairKind kind, int const (&v)[4], Vec3<double> const (&y)[4],
-                            bool one_body, double far, PairNote& note) const {
-    double const low = distance_below(kind, y, activation.dhat + far);
-    if (!(low < activation.dhat + far)) return false;
-    note.activation = activation(kind, v);
-    note.distance = pair_length(one_body, FoundDistances<S>::shaded(low, y));
-    return low < watched(note.activation) + far;
-  }
   /// The distance below which a pair is looked after that acts below `acts_below`.
   KOKKOS_FUNCTION double watched(double acts_below) const {
     return Kokkos::max(acts_below, 0.5 * activation.dhat);
   }
-  KOKKOS_FUNCTION double reach_of(bool one_body, int const (&v)[4],
-                                  Vec3<double> const (&y)[4]) const {
-    double const far = one_body ? reach.within : reach.between;
+  KOKKOS_FUNCTION double reach_of(bool one_body) const {
+    return one_body ? reach.within : reach.between;
+  }
+  /// The same, where there is motion, for pairs that are at y, one or a pack of them.
+  template <class T>
+  KOKKOS_FUNCTION T moving(T const& far, int const (&v)[4][ScalarTraits<T>::lanes],
+                           Vec3<T> const (&y)[4]) const {
     return motion.moves() ? far + relative_motion(v, y) : far;
   }
   /// Of the vertices of a pair against each other, and what storing their ends may add: the
   /// diagonal of the box around their steps.
-  KOKKOS_FUNCTION double relative_motion(int const (&v)[4], Vec3<double> const (&y)[4]) const {
+  template <class T>
+  KOKKOS_FUNCTION T relative_motion(int const (&v)[4][ScalarTraits<T>::lanes],
+                                    Vec3<T> const (&y)[4]) const {
     constexpr double epsilon_x = Kokkos::Experimental::epsilon_v<typename Precision::position>;
     constexpr double epsilon = Kokkos::Experimental::epsilon_v<typename Precision::real>;
-    Vec3<double> step[4];
-    for (int a = 0; a < 4; ++a) step[a] = motion.step(v[a]);
-    double square = 0, size = 0, place = 0;
+    Vec3<T> const step[4] = {motion_of<T>(v[0]), motion_of<T>(v[1]), motion_of<T>(v[2]),
+                             motion_of<T>(v[3])};
+    T sum(0.0), size(0.0), place(0.0);
     for (int c = 0; c < 3; ++c) {
-      double low = step[0][c], high = low;
+      T low = step[0][c], high = low;
       for (int a = 0; a < 4; ++a) {
-        low = Kokkos::min(low, step[a][c]);
-        high = Kokkos::max(high, step[a][c]);
-        size = Kokkos::max(size, Kokkos::abs(step[a][c]));
-        place = Kokkos::max(place, Kokkos::abs(y[a][c] + step[a][c]));
+        low = min(low, step[a][c]);
+        high = max(high, step[a][c]);
+        size = max(size, abs(step[a][c]));
+        place = max(place, abs(T(y[a][c] + step[a][c])));
       }
-      square += (high - low) * (high - low);
+      sum += (high - low) * (high - low);
     }
     // Four vertices, each off by no more than sqrt(3) times what its largest component is.
-    return (1 + 1e-15) * Kokkos::sqrt(square) + 7 * (4 * epsilon * size + 2 * epsilon_x * place);
+    return T(1 + 1e-15) * sqrt(sum) + T(28 * epsilon) * size + T(14 * epsilon_x) * place;
   }
-  /// The distance, less the round-off of computing it; infinite where boxes tell that it is not
-  /// below `farthest`.
-  KOKKOS_FUNCTION static double distance_below(PairKind kind, Vec3<double> const (&y)[4],
-                                               double farthest) {
-    if (square_box_gap(kind, y) > (1 + 1e-12) * farthest * farthest) {
-      return Kokkos::Experimental::infinity_v<double>;
+  template <class T>
+  KOKKOS_FUNCTION Vec3<T> motion_of(int const (&v)[ScalarTraits<T>::lanes]) const {
+    if constexpr (is_pack<T>) {
+      Vec3<T> r;
+      for (int c = 0; c < 3; ++c) {
+        r[c] = T([&](std::size_t i) { return motion.alpha * double(motion.p(v[i], c)); });
+      }
+      return r;
+    } else {
+      return motion.step(v[0]);
     }
-    double size = 0;
-    for (int a = 1; a < 4; ++a) size += norm(y[a] - y[0]);
-    // As for CloserThan.
-    constexpr double budget = 16 * Kokkos::Experimental::epsilon_v<double>;
-    return closest_points(kind, y).distance - budget * size;
   }
 };
 
-/// The same among neighbours, of which what does not change is known.
+template <class T>
+KOKKOS_FORCEINLINE_FUNCTION Vec3<ValueType<T>> lane_of(Vec3<T> const& y, int i) {
+  return {lane(y[0], i), lane(y[1], i), lane(y[2], i)};
+}
+
+/// The distance of a pair, less the round-off of computing it, or of a pack of them; infinite where
+/// boxes tell that it is not below `farthest`.
+template <class T>
+KOKKOS_FUNCTION T distance_below(PairKind kind, Vec3<T> const (&y)[4], T const& farthest) {
+  T const infinity(Kokkos::Experimental::infinity_v<double>);
+  auto const near = !(square_box_gap(kind, y) > T(1 + 1e-12) * farthest * farthest);
+  if constexpr (is_pack<T>) {
+    if (!any_lane(near)) return infinity;
+  } else {
+    if (!near) return infinity;
+  }
+  T size(0.0);
+  for (int a = 1; a < 4; ++a) size += norm(y[a] - y[0]);
+  // As for CloserThan.
+  T const budget(16 * Kokkos::Experimental::epsilon_v<double>);
+  return select(near, T(closest_points(kind, y).distance - budget * size), infinity);
+}
+
+/// Chooses those among neighbours, of which what does not change is known.
 template <class Precision, class S>
 struct StillWithinReach {
   WithinReach<Precision, S> within;
 
-  /// Compiled once, as in WithinReach.
-  [[gnu::noinline]] KOKKOS_FUNCTION bool operator()(PairKind kind, int const (&v)[4],
-                                                    Vec3<double> const (&y)[4],
-                                                    PairNote& note) const {
-    bool const one_body =
-        note.distance < 0 || (note.distance == 0 && within.activation.one_body(v));
-    double const farthest = within.watched(note.activation) + within.reach_of(one_body, v, y);
-    double const low = within.distance_below(kind, y, farthest);
-    note.distance = pair_length(one_body, FoundDistances<S>::shaded(low, y));
-    return low < farthest;
+  /// Compiled once, as what contact_kernels.hpp computes: which pairs are candidates must not
+  /// depend on the number of threads.
+  template <class T, int lanes>
+  [[gnu::noinline]] KOKKOS_FUNCTION void judge(PairKind kind, int const (&v)[4][lanes],
+                                               Vec3<T> const (&y)[4], PairNote (&note)[lanes],
+                                               bool (&keep)[lanes]) const {
+    bool one_body[lanes];
+    double reach[lanes], watched[lanes], below[lanes], least[lanes];
+    for (int i = 0; i < lanes; ++i) {
+      float const d = note[i].distance;
+      int const ends[4] = {v[0][i], v[1][i], v[2][i], v[3][i]};
+      one_body[i] = d < 0 || (d == 0 && within.activation.one_body(ends));
+      reach[i] = within.reach_of(one_body[i]);
+      watched[i] = within.watched(note[i].activation);
+    }
+    T const farthest = load<T>(watched) + within.moving(load<T>(reach), v, y);
+    T const low = distance_below(kind, y, farthest);
+    store(low, below);
+    store(farthest, least);
+    for (int i = 0; i < lanes; ++i) {
+      Vec3<double> const at[4] = {lane_of(y[0], i), lane_of(y[1], i), lane_of(y[2], i),
+                                  lane_of(y[3], i)};
+      keep[i] = below[i] < least[i];
+      if (keep[i]) {
+        note[i].distance = pair_length(one_body[i], FoundDistances<S>::shaded(below[i], at));
+      }
+    }
   }
 };
 
@@ -140,18 +168,37 @@ struct NearAnchors {
   WithinReach<Fp64, S> within;
   Array<double, S> radius;
 
-  /// Compiled once, as in WithinReach.
-  [[gnu::noinline]] KOKKOS_FUNCTION bool operator()(PairKind kind, int const (&v)[4],
-                                                    Vec3<double> const (&y)[4],
-                                                    PairNote& note) const {
-    bool const one_body = within.activation.one_body(v);
+  /// Compiled once, as in StillWithinReach.
+  template <class T, int lanes>
+  [[gnu::noinline]] KOKKOS_FUNCTION void judge(PairKind kind, int const (&v)[4][lanes],
+                                               Vec3<T> const (&y)[4], PairNote (&note)[lanes],
+                                               bool (&keep)[lanes]) const {
     int const second = kind == PairKind::point_triangle ? 1 : 2;
-    double r[2] = {0, 0};
-    for (int a = 0; a < 4; ++a) {
-      r[a < second ? 0 : 1] = Kokkos::max(r[a < second ? 0 : 1], radius(v[a]));
+    bool one_body[lanes];
+    double reach[lanes], far[lanes], below[lanes];
+    for (int i = 0; i < lanes; ++i) {
+      int const ends[4] = {v[0][i], v[1][i], v[2][i], v[3][i]};
+      one_body[i] = within.activation.one_body(ends);
+      double r[2] = {0, 0};
+      for (int a = 0; a < 4; ++a) {
+        double& of_side = r[a < second ? 0 : 1];
+        of_side = Kokkos::max(of_side, radius(ends[a]));
+      }
+      reach[i] = within.reach_of(one_body[i]) + r[0] + r[1];
     }
-    double const far = within.reach_of(one_body, v, y) + r[0] + r[1];
-    return within.keep(kind, v, y, one_body, far, note);
+    T const whole = within.moving(load<T>(reach), v, y);
+    store(whole, far);
+    store(distance_below(kind, y, T(T(within.activation.dhat) + whole)), below);
+    for (int i = 0; i < lanes; ++i) {
+      keep[i] = below[i] < within.activation.dhat + far[i];
+      if (!keep[i]) continue;
+      int const ends[4] = {v[0][i], v[1][i], v[2][i], v[3][i]};
+      Vec3<double> const at[4] = {lane_of(y[0], i), lane_of(y[1], i), lane_of(y[2], i),
+                                  lane_of(y[3], i)};
+      note[i].activation = within.activation(kind, ends);
+      note[i].distance = pair_length(one_body[i], FoundDistances<S>::shaded(below[i], at));
+      keep[i] = below[i] < within.watched(note[i].activation) + far[i];
+    }
   }
 };
 
@@ -463,9 +510,9 @@ public:
     using Source = kernels::FoundPrimitives<kind, S>;
     grow(place_, "neighbour_place", n);
     grow_notes(judged_, n);
-    for_each<S>("neighbours_judge", n,
-                kernels::JudgePairs<kind, S, Source, Positions, Filter>{
-                    {surface, found_}, x, filter, place_, judged_});
+    kernels::JudgePairs<kind, S, Source, Positions, Filter> const judge{
+        {surface, found_}, x, filter, n, place_, judged_};
+    for_each<S>("neighbours_judge", judge.packs(), judge);
     compact(found_, judged_, count_, n);
   }
 
