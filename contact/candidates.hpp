@@ -130,7 +130,7 @@ struct JudgePairs {
 
 private:
   KOKKOS_FUNCTION void side_by_side(int first) const {
-    int const n = Kokkos::min(lanes, count - first);
+    int const n = Kokkos::min(int(lanes), count - first);
     int v[4][lanes];
     PairNote note[lanes];
     for (int i = 0; i < lanes; ++i) {
