@@ -41,6 +41,7 @@ struct CacheCounters {
   std::int64_t searches = 0;  ///< updates that searched
   std::int64_t reuses = 0;    ///< updates that found the candidates complete
   std::int64_t skipped = 0;   ///< updates that found that nothing can touch (among the former two)
+  double seconds = 0;         ///< of the searches
 };
 
 namespace kernels {
@@ -155,7 +156,9 @@ public:
       ++counters_.reuses;
     } else {
       ++counters_.searches;
+      Kokkos::Timer const timer;
       search(motion);
+      counters_.seconds += timer.seconds();
     }
     bool const clear = moved_.within < clear_for_.within && moved_.between < clear_for_.between;
     if (!clear) return Touch::possible;

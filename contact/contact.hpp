@@ -209,6 +209,15 @@ public:
   /// bounds of long ones.
   CacheCounters const& energy_counters() const { return state_->near.counters(); }
   CacheCounters const& bound_counters() const { return state_->swept.counters(); }
+  /// What of the former two went through the surface, all of it or around single vertices.
+  NeighbourCounters neighbour_counters() const {
+    NeighbourCounters sum = state_->near.neighbour_counters();
+    NeighbourCounters const& other = state_->swept.neighbour_counters();
+    sum.full += other.full;
+    sum.partial += other.partial;
+    sum.vertices += other.vertices;
+    return sum;
+  }
   ContactReport report(Positions const& x) const {
     ContactReport r;
     if (!state_->complete(x)) return r;

@@ -45,8 +45,8 @@ struct ContactRow {
   double fraction = 0;      ///< of the smaller of both limits; 0 where nothing was counted
   double held = 0;          ///< with "iteration": bytes in arrays of the contact term
   double peak = 0;          ///< with "iteration": the same, at most so far
-  double searches = 0;      ///< with "iteration": per iteration, of both caches
-  double search_share = 0;  ///< with "iteration": of searches
+  double searches = 0;      ///< with "iteration": through the whole surface, per iteration
+  double search_share = 0;  ///< with "iteration": of all that finds candidates
   double bound_share = 0;   ///< with "iteration": of step bounds
   int allocations = 0;      ///< with "iteration": in all iterations of a second step
 };

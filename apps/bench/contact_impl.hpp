@@ -185,9 +185,8 @@ private:
         what();
       });
     };
-    near_seconds_ = std::max(0.0, anew(form) - form_seconds);
-    swept_seconds_ = std::max(0.0, anew(bound) - bound_seconds);
-    add(rows, "renewal", near_seconds_ + swept_seconds_);
+    add(rows, "renewal",
+        std::max(0.0, anew(form) - form_seconds) + std::max(0.0, anew(bound) - bound_seconds));
     return bound_seconds;
   }
 
@@ -259,17 +258,21 @@ private:
     };
     run();
     long const allocations = MemoryWatch::allocations();
-    std::int64_t const near = contact.energy_counters().searches;
-    std::int64_t const swept = contact.bound_counters().searches;
+    auto const searching = [&] {
+      return contact.energy_counters().seconds + contact.bound_counters().seconds;
+    };
+    std::int64_t const full = contact.neighbour_counters().full;
+    double const searched = searching();
+    Kokkos::Timer const timer;
     run();
-    double const n = double(contact.energy_counters().searches - near) / taken;
-    double const m = double(contact.bound_counters().searches - swept) / taken;
+    double const search_share = (searching() - searched) / timer.seconds();
+    double const searches = double(contact.neighbour_counters().full - full) / taken;
     long const after = MemoryWatch::allocations();
     add(rows, "iteration", best_seconds(options_.seconds, run) / taken);
     ContactRow& row = rows.back();
     row.allocations = static_cast<int>(after - allocations);
-    row.searches = n + m;
-    row.search_share = (n * near_seconds_ + m * swept_seconds_) / row.seconds;
+    row.searches = searches;
+    row.search_share = search_share;
     row.bound_share = bound / row.seconds;
   }
 
@@ -284,7 +287,6 @@ private:
   BlockField<Real, S> b_;
   ContactRow all_;
   ContactSizes sizes_{};
-  double near_seconds_ = 0, swept_seconds_ = 0;
 };
 
 template <class P>

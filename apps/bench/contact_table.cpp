@@ -73,7 +73,7 @@ std::string block_table(Rows const& rows, Block const& block) {
   text += with("tets in an iteration, ns", "iteration", [](ContactRow const& row) {
     return fmt::format("{:.1f}", 1e9 * row.seconds / row.tets);
   });
-  text += with("searches per iteration", "iteration",
+  text += with("full searches per iteration", "iteration",
                [](ContactRow const& row) { return fmt::format("{:.2f}", row.searches); });
   text += with("share search + bound", "iteration", [](ContactRow const& row) {
     return fmt::format("{:.0f}% + {:.0f}%", 100 * row.search_share, 100 * row.bound_share);
