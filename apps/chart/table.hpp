@@ -41,9 +41,8 @@ std::string field(double number);
 /// scene,frame,method,iteration,seconds,position_error,energy_gap,residual,linear_iterations,ended:
 /// a row per iteration; the last row of a method says how it ended (see Trace). Energies are empty
 /// where there is contact, residuals where there are none, linear iterations (up to this one) where
-/// they were not asked for. fields.csv, of iterations that were:
-/// scene,frame,method,iteration,x,y,z, error,residual, a row per point, which is where it is at the
-/// start of the step.
+/// they were not asked for. fields.csv, of the iterations that were, has a row per point, which is
+/// where it is at the start of the step: scene,frame,method,iteration,x,y,z,error,residual.
 std::string compare_methods(std::filesystem::path const& scene, ChartOptions const& options,
                             std::vector<ChartMethod> const& methods, MoreTables& more);
 

@@ -464,7 +464,7 @@ def draw_fields(facts, rows, measure):
     iterations = sorted({row["iteration"] for row in rows})
     values = [row[measure] for row in rows if row[measure] > 0]
     high = max(values)
-    low = max(min(values), 1e-9 * high)
+    low = max(min(values), 1e-7 * high)
     norm = matplotlib.colors.LogNorm(low, high)
     figure, grid = plt.subplots(len(curves), len(iterations), squeeze=False,
                                 figsize=(12, 0.9 + 10.2 / max(len(iterations), 3) * len(curves)))
@@ -475,7 +475,7 @@ def draw_fields(facts, rows, measure):
             mine.sort(key=lambda row: row[measure])
             spread = max(np.ptp([row["x"] for row in mine]), np.ptp([row["y"] for row in mine]))
             places = len({(round(row["x"] / spread, 4), round(row["y"] / spread, 4)) for row in mine})
-            size = (0.85 * 72 * 9 / max(len(iterations), 3)) ** 2 / places
+            size = (0.9 * 72 * 9 / max(len(iterations), 3)) ** 2 / places
             drawn = axes.scatter([row["x"] for row in mine], [row["y"] for row in mine], s=size,
                                  c=[max(row[measure], low) for row in mine], norm=norm, marker="s",
                                  cmap="turbo", lw=0)
@@ -560,7 +560,7 @@ def describe(facts, by_residual):
     if facts["kind"] == "matrices":
         return text + "Scalars that may be other than zero, nodes in the order of their coordinates"
     if by_residual:
-        return text + "What is left of the forces, over a characteristic force of each node, rms"
+        return text + "What is left of the force at each node, over a characteristic one (curves: rms)"
     text += "Errors against projected Newton in fp64"
     if facts["length"] == "motion":
         text += ", in units of the motion in the step"
@@ -611,7 +611,7 @@ def write(out, facts, rows, drawn, by_residual=False):
     for axes, ends in labels:
         label_ends(axes, ends)
     figure.savefig(out + ".svg")
-    figure.savefig(out + ".png", dpi=160 if panels or width > 12 else 130)
+    figure.savefig(out + ".png", dpi=140 if panels else 130)
     plt.close(figure)
 
 
