@@ -23,7 +23,7 @@ import numpy as np
 matplotlib.use("Agg")
 import matplotlib.pyplot as plt
 from matplotlib.patheffects import withStroke
-from matplotlib.ticker import LogLocator, NullFormatter
+from matplotlib.ticker import LogLocator, MaxNLocator, NullFormatter
 
 # Okabe and Ito's colours, told apart by all kinds of colour vision; then again, dashed.
 COLOURS = ["#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#000000"]
@@ -38,6 +38,7 @@ plt.rcParams.update({
     "axes.spines.top": False, "axes.spines.right": False, "axes.labelcolor": INK,
     "xtick.color": INK, "ytick.color": INK, "text.color": INK, "svg.fonttype": "none",
     "axes.grid": True, "grid.color": "#e6e6e6", "grid.linewidth": 0.6,
+    "axes.axisbelow": True,
 })
 
 
@@ -268,6 +269,7 @@ def draw_bars(facts, rows, by_residual):
     measure = "residual" if by_residual else "position_error"
     figure, axes = plt.subplots(figsize=(12, 1.8 + 0.17 * len(groups) * (len(styles) + 1.5)))
     axes.set_xscale("log")
+    axes.xaxis.set_minor_formatter(NullFormatter())
     bars, failures, ticks = [], [], []
     for g, (scene, frame) in enumerate(groups):
         first = g * (len(styles) + 1.5)
@@ -412,17 +414,23 @@ def draw_relative(facts, rows, costs):
         for y, row in enumerate(mine):
             own = seconds.get((scene, row["method"]), [])[:len(of_unit)]
             done = row["ended"] == "end of scene"
-            text = "" if done else f"   {row['ended']}, {row['frames']:.0f} of {row['of_frames']:.0f} frames"
-            ratios = (0, 0)
+            text = f"   error {1e3 * row['error_m']:.2g} mm" if math.isfinite(row["error_m"]) else ""
+            if not done:
+                text += f"   {row['ended']}, {row['frames']:.0f} of {row['of_frames']:.0f} frames"
+            ratios = (1, 1)
             if own:
                 ratios = (sum(own) / sum(of_unit[:len(own)]), max(a / b for a, b in zip(own, of_unit)))
-            for axes, ratio in zip(pair, ratios):
-                axes.barh(y, ratio, height=0.62, color=styles[row["method"]]["color"],
+            for axes, ratio, more in zip(pair, ratios, (text, "")):
+                axes.barh(y, ratio, left=0, height=0.62, color=styles[row["method"]]["color"],
                           alpha=0.85 if done else 0.3, lw=0)
-                axes.annotate((f"{ratio:.2f}" if own else "") + text, (ratio, y), xytext=(6, 0), va="center",
+                axes.annotate((f"{ratio:.2f}" if own else "") + more, (ratio, y), xytext=(6, 0), va="center",
                               textcoords="offset points", fontsize="small", annotation_clip=False,
                               path_effects=HALO)
         for axes in pair:
+            axes.set_xscale("log")  # bars from a sixth of the least
+            axes.xaxis.set_minor_formatter(NullFormatter())
+            widths = [bar.get_width() for bar in axes.patches]
+            axes.set_xlim(min(widths) / 6, 2 * max(widths))
             axes.axvline(1, color=PALE, lw=0.8, ls=(0, (4, 3)), zorder=1)
             axes.set_yticks(range(len(mine)), [row["method"] for row in mine])
             axes.invert_yaxis()
@@ -451,6 +459,7 @@ def draw_frames(facts, costs):
                 if points:
                     axes.plot(*zip(*points), lw=1.2, **style)
                     ends.append((*points[-1], method, style["color"]))
+            axes.xaxis.set_major_locator(MaxNLocator(integer=True))
             axes.set_xlabel("frame")
             axes.set_ylabel(f"{measure.replace('_', ' ')} of a frame")
             labels.append((axes, ends))
