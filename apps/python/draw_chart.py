@@ -23,7 +23,7 @@ import numpy as np
 matplotlib.use("Agg")
 import matplotlib.pyplot as plt
 from matplotlib.patheffects import withStroke
-from matplotlib.ticker import LogLocator, MaxNLocator, NullFormatter
+from matplotlib.ticker import LogLocator, MaxNLocator, NullFormatter, ScalarFormatter
 
 # Okabe and Ito's colours, told apart by all kinds of colour vision; then again, dashed.
 COLOURS = ["#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#000000"]
@@ -328,6 +328,10 @@ def draw_sweep(facts, rows, by_residual=False):
             failures += [(row["value"], row["ended"], style["color"], method) for row in mine
                          if not row[measure] > 0]
         draw_failures(axes, failures)
+        low, high = axes.get_ylim()
+        if high < 10 * low:  # too little for powers of ten
+            axes.yaxis.set_major_formatter(ScalarFormatter())
+            axes.yaxis.set_minor_formatter(ScalarFormatter())
         axes.set_xlabel(facts["key"])
         axes.set_ylabel(f"{title} to {goal}")
         labels.append((axes, ends))
