@@ -44,9 +44,10 @@ std::string describe(Scene const& scene, SceneGeometry const& geometry) {
                   geometry.materials);
 }
 
-std::string describe_target(ChartOptions const& options) {
-  return fmt::format("# target = {:g}\n# length = {}\n", options.target,
-                     options.length ? fmt::format("{:g} m", *options.length) : "motion");
+std::string describe_target(ChartOptions const& options, bool particles) {
+  return fmt::format("# target = {:g}\n# length = {}\n{}", options.target,
+                     options.length ? fmt::format("{:g} m", *options.length) : "motion",
+                     particles ? fmt::format("# residual = {:g}\n", options.residual) : "");
 }
 
 std::string field(double number) {
@@ -62,6 +63,10 @@ void check_options(ChartOptions const& options) {
   };
   require(std::isfinite(options.target) && options.target > 0, "--target", options.target,
           "above 0");
+  require(std::isfinite(options.residual) && options.residual > 0, "--residual", options.residual,
+          "above 0");
+  require(options.levels > 0 && options.levels <= 20, "--levels", options.levels, "1 to 20");
+  for (int iteration : options.fields) require(iteration >= 0, "--fields", iteration, "0 or more");
   require(options.max_seconds > 0, "--seconds", options.max_seconds, "above 0");
   require(options.repetitions > 0, "--repetitions", options.repetitions, "at least 1");
   require(options.max_iterations > 0, "--iterations", options.max_iterations, "at least 1");
@@ -83,15 +88,23 @@ int chart_command(ChartOptions const& options) {
     throw Error("{}: a chart is there already: choose another --out or replace it with --force",
                 out.string());
   }
-  if (options.sweep + options.stability + options.totals > 1)
-    throw Error("--sweep, --stability and --totals: choose one");
-  bool const compares = !options.sweep && !options.stability && !options.totals;
+  if (options.sweep + options.stability + options.totals + options.matrices > 1)
+    throw Error("--sweep, --stability, --totals and --matrices: choose one");
+  bool const compares =
+      !options.sweep && !options.stability && !options.totals && !options.matrices;
   if ((!options.with.empty() && !compares && !options.totals) ||
       (options.without_contact && !compares)) {
     throw Error("--with and --without-contact are of a comparison: leave out --{}",
                 options.sweep       ? "sweep"
                 : options.stability ? "stability"
+                : options.matrices  ? "matrices"
                                     : "totals");
+  }
+  if ((options.linear || !options.fields.empty()) && !compares) {
+    throw Error("--linear and --fields are of a comparison of single steps");
+  }
+  if (!options.relative.empty() && !options.totals) {
+    throw Error("--relative is of --totals: add it");
   }
   if (options.totals && !options.frames.empty()) {
     throw Error("--totals takes whole scenes: shorten them by --set time.frames=N, not by --frame");
@@ -106,18 +119,34 @@ int chart_command(ChartOptions const& options) {
   if (particles && options.stability) {
     throw Error("--stability is of policies of contact, which material points do not have");
   }
+  if (options.matrices && !particles) {
+    throw Error("--matrices is of levels over the grid of material points, which {} does not have",
+                options.scene.scene);
+  }
+  if (options.matrices && !options.methods.empty()) {
+    throw Error("--matrices looks at hierarchies, not at --methods: leave them out");
+  }
   std::vector<ChartMethod> const methods = parse_methods(options.methods, particles);
   // A folder that cannot be written shows now and not when all is measured.
   std::filesystem::path const probe = out / ".taut";
   write_file_atomically(probe, "");
   std::filesystem::remove(probe);
-  std::string const table = options.stability ? stability_of_policies(scene, options)
-                            : options.totals  ? totals_of_methods(scene, options, methods)
-                            : options.sweep   ? sweep_methods(scene, options, methods)
-                                              : compare_methods(scene, options, methods);
+  MoreTables more;
+  std::string const table = options.stability  ? stability_of_policies(scene, options)
+                            : options.matrices ? patterns_of_matrices(scene, options, more)
+                            : options.totals   ? totals_of_methods(scene, options, methods, more)
+                            : options.sweep    ? sweep_methods(scene, options, methods)
+                                               : compare_methods(scene, options, methods, more);
+  // What a chart of another kind has left would be drawn as if it were of this one.
+  for (char const* name : {"frames.csv", "fields.csv", "patterns.csv"}) {
+    std::filesystem::remove(out / name);
+  }
+  for (auto const& [name, text] : more) write_file_atomically(out / name, text);
   write_file_atomically(data, table);
   write_file_atomically(out / "data.json", to_json(table));
-  fmt::print("data     {}, data.json\n", data.string());
+  fmt::print("data     {}, data.json", data.string());
+  for (auto const& [name, text] : more) fmt::print(", {}", name);
+  fmt::print("\n");
   if (options.draw) {
     run_drawing({"draw_chart.py", {"matplotlib"}, {"matplotlib>=3.7,<4"}},
                 {data.string(), (out / "chart").string()}, data);

@@ -5,7 +5,11 @@
 //
 // With `sweep`, the iterations and seconds to an error of `target` against the swept value of the
 // scene. With `totals`, the seconds of whole scenes. With `stability`, no errors: how far policies
-// of contact bring the scene until a step is not clean.
+// of contact bring the scene until a step is not clean. With `matrices`, no methods either: how
+// full the matrices of hierarchies are, level by level.
+//
+// Where terms know a characteristic force (material points) all is measured a second time, by the
+// residual that the literature stops by, and drawn as residual.png.
 #pragma once
 
 #include <taut/apps/program/commands.hpp>
@@ -27,11 +31,17 @@ struct ChartOptions {
   bool sweep = false;
   bool stability = false;
   bool totals = false;  ///< whole scenes instead of single steps
+  bool matrices = false;
+  int levels = 5;           ///< of `matrices`, the fine one counted
+  std::string relative;     ///< method of `totals` whose seconds are the unit
+  bool linear = false;      ///< also counts linear iterations up to each of a comparison
+  std::vector<int> fields;  ///< iterations of a comparison that are shown point by point
   /// Of `stability`: KEY=VALUE[:KEY=VALUE...] of [contact], or of another table as TABLE.KEY; empty
   /// or "all": those of `default_policies`.
   std::vector<std::string> policies;
   double target = 0.01;          ///< a method that ends above this error has failed
   double lowest = 1e-8;          ///< below this error a curve ends
+  double residual = 1e-7;        ///< that counts as solved, where there are residuals
   std::optional<double> length;  ///< m, what errors are relative to; by default the step's motion
   int max_iterations = 2000;
   double max_seconds = 60;    ///< per method, while its errors are recorded; or per policy
@@ -41,7 +51,9 @@ struct ChartOptions {
   bool draw = true;           ///< false: no pictures, no Python
 };
 
-/// Writes data.csv, data.json, chart.svg and chart.png. Throws Error.
+/// Writes data.csv, data.json, chart.svg and chart.png; with `totals` also frames.csv, a row per
+/// frame, with `fields` fields.csv, a row per point, with `matrices` patterns.csv, and what is
+/// drawn of these. Throws Error.
 int chart_command(ChartOptions const& options);
 inline constinit LatePart<int(ChartOptions const&)> chart_command_late;
 

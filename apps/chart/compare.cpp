@@ -3,6 +3,7 @@
 #include <taut/core/report/error.hpp>
 
 #include <algorithm>
+#include <array>
 
 namespace taut {
 namespace {
@@ -34,9 +35,14 @@ public:
     for (auto const& file : files_) load_contestants(file);
   }
 
-  std::string run() {
+  std::string run(MoreTables& more) {
     for (auto const& file : files_) run(file);
-    return header_ + "scene,frame,method,iteration,seconds,position_error,energy_gap,ended\n" +
+    if (!options_.fields.empty()) {
+      more["fields.csv"] = "scene,frame,method,iteration,x,y,z,error,residual\n" + fields_;
+    }
+    return header_ +
+           "scene,frame,method,iteration,seconds,position_error,energy_gap,residual,"
+           "linear_iterations,ended\n" +
            rows_;
   }
 
@@ -44,14 +50,21 @@ private:
   std::vector<Contestant> load_contestants(std::filesystem::path const& file) const {
     return contestants(file, options_.scene.changes, methods_, options_.max_iterations);
   }
+  /// A method that does so many iterations and no more, whatever it was told.
+  Scene limited(std::filesystem::path const& file, std::size_t method, int iterations) const {
+    std::array const limit{fmt::format("solver.max_iterations={}", iterations)};
+    ChartMethod own = methods_[method];
+    own.overrides.insert(own.overrides.end(), limit.begin(), limit.end());
+    return contestants(file, options_.scene.changes, {own}, iterations).front().scene;
+  }
 
   void run(std::filesystem::path const& file) {
     Scene const scene = load_scene(file, options_.scene.changes);
     std::vector<Contestant> const all = load_contestants(file);
     std::unique_ptr<ChartScene> const steps = make_chart_scene(file, options_.scene.changes);
-    header_ += header_.empty()
-                   ? "# kind = comparison\n" + steps->description() + describe_target(options_)
-                   : fmt::format("# with = {}\n", scene.name);
+    header_ += header_.empty() ? "# kind = comparison\n" + steps->description() +
+                                     describe_target(options_, scene.particles.has_value())
+                               : fmt::format("# with = {}\n", scene.name);
     std::vector<int> frames = options_.frames;
     if (frames.empty()) frames = {std::min(10, scene.frames)};
 
@@ -63,15 +76,15 @@ private:
     }
     for (int frame : frames) {
       ReferenceStep const step = steps->advance_to(frame);
-      compare(scene.name, *steps, all, step);
+      compare(file, scene.name, *steps, all, step);
       if (!steps_alone) continue;
-      compare(scene.name + " without contact", *steps_alone, alone,
+      compare(file, scene.name + " without contact", *steps_alone, alone,
               steps_alone->solve(step.before, frame));
     }
   }
 
-  void compare(std::string const& name, ChartScene const& scene, std::vector<Contestant> const& all,
-               ReferenceStep const& step) {
+  void compare(std::filesystem::path const& file, std::string const& name, ChartScene const& scene,
+               std::vector<Contestant> const& all, ReferenceStep const& step) {
     std::unique_ptr<StepMeasure> const measure = scene.measure(step, options_.length);
     describe_step(name, step, *measure);
     fmt::print(
@@ -83,12 +96,20 @@ private:
     fmt::print("{:<26} {:>10} {:>10} {:>11} {:>11} {:>11}  ended\n", "",
                fmt::format("to {:g}", options_.target), "seconds", "frames/s", "last error",
                "iterations");
-    for (Contestant const& one : all) {
-      auto const simulation = scene.contestant(one.scene);
+    for (std::size_t m = 0; m < all.size(); ++m) {
+      auto const simulation = scene.contestant(all[m].scene);
       Trace const found = trace(*simulation, step, *measure,
-                                {options_.lowest, options_.max_seconds, options_.repetitions});
-      add_rows(fmt::format("{},{},{}", name, step.step, one.label), found);
-      say(one.label, found);
+                                {options_.lowest, options_.max_seconds, options_.repetitions,
+                                 options_.residual, options_.fields});
+      std::vector<int> linear;
+      if (options_.linear) {
+        auto const short_of = [&](int k) { return scene.contestant(limited(file, m, k)); };
+        linear = linear_iterations(short_of, step, found.points.size(), options_.max_seconds);
+      }
+      std::string const label = fmt::format("{},{},{}", name, step.step, all[m].label);
+      add_rows(label, found, linear);
+      add_fields(label, step, *measure, found);
+      say(all[m].label, found);
     }
   }
 
@@ -107,14 +128,28 @@ private:
     }
   }
 
-  void add_rows(std::string const& label, Trace const& trace) {
+  void add_rows(std::string const& label, Trace const& trace, std::vector<int> const& linear) {
     // A method that took no step at all still has a row to say so.
-    if (trace.points.empty()) rows_ += fmt::format("{},0,,,,{}\n", label, trace.ended);
+    if (trace.points.empty()) rows_ += fmt::format("{},0,,,,,,{}\n", label, trace.ended);
     for (std::size_t k = 0; k < trace.points.size(); ++k) {
       TracePoint const& p = trace.points[k];
-      rows_ += fmt::format("{},{},{},{},{},{}\n", label, k + 1, field(p.seconds),
-                           field(p.position_error), field(p.energy_gap),
+      rows_ += fmt::format("{},{},{},{},{},{},{},{}\n", label, k + 1, field(p.seconds),
+                           field(p.position_error), field(p.energy_gap), field(p.residual),
+                           k < linear.size() ? std::to_string(linear[k]) : "",
                            k + 1 == trace.points.size() ? trace.ended : "");
+    }
+  }
+
+  void add_fields(std::string const& label, ReferenceStep const& step, StepMeasure const& measure,
+                  Trace const& trace) {
+    for (auto const& [iteration, x] : trace.kept) {
+      std::vector<double> const errors = measure.errors(x), residuals = measure.residuals(x);
+      for (std::size_t i = 0; i < errors.size(); ++i) {
+        Point const& at = step.start[i];
+        fields_ +=
+            fmt::format("{},{},{:.6g},{:.6g},{:.6g},{},{}\n", label, iteration, at[0], at[1], at[2],
+                        field(errors[i]), residuals.empty() ? std::string() : field(residuals[i]));
+      }
     }
   }
 
@@ -135,14 +170,14 @@ private:
   ChartOptions const& options_;
   std::vector<ChartMethod> const& methods_;
   std::vector<std::filesystem::path> files_;
-  std::string header_, rows_;
+  std::string header_, rows_, fields_;
 };
 
 }  // namespace
 
 std::string compare_methods(std::filesystem::path const& file, ChartOptions const& options,
-                            std::vector<ChartMethod> const& methods) {
-  return Comparison(file, options, methods).run();
+                            std::vector<ChartMethod> const& methods, MoreTables& more) {
+  return Comparison(file, options, methods).run(more);
 }
 
 }  // namespace taut

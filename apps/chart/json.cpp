@@ -20,7 +20,8 @@ Json value_of(std::string const& text) {
 }
 
 /// Of rows first to last (excluded), which are the iterations of one method.
-Json summary(Json const& rows, std::size_t first, std::size_t last, double target) {
+Json summary(Json const& rows, std::size_t first, std::size_t last, Json const& facts) {
+  double const target = facts["target"].get<double>();
   Json result;
   for (char const* key : {"scene", "frame", "method"}) result[key] = rows[first][key];
   result["ended"] = rows[last - 1]["ended"];
@@ -32,6 +33,19 @@ Json summary(Json const& rows, std::size_t first, std::size_t last, double targe
   while (reached > first && below(rows[reached - 1]["position_error"])) --reached;
   for (char const* key : {"iterations_to_target", "seconds_to_target", "frames_per_second"})
     result[key] = nullptr;
+  if (facts.contains("residual")) {
+    double const tolerance = facts["residual"].get<double>();
+    result["last_residual"] = rows[last - 1]["residual"];
+    for (char const* key : {"iterations_to_residual", "seconds_to_residual"}) result[key] = nullptr;
+    for (std::size_t k = first; k < last; ++k) {
+      if (!rows[k]["residual"].is_number() || rows[k]["residual"].get<double>() >= tolerance) {
+        continue;
+      }
+      result["iterations_to_residual"] = rows[k]["iteration"];
+      result["seconds_to_residual"] = rows[k]["seconds"];
+      break;
+    }
+  }
   if (reached == last) return result;
   result["iterations_to_target"] = rows[reached]["iteration"];
   result["seconds_to_target"] = rows[reached]["seconds"];
@@ -80,11 +94,10 @@ std::string to_json(std::string const& table) {
   Json chart{{"facts", facts}};
   if (facts["kind"] == "comparison") {
     Json methods = Json::array();
-    double const target = facts["target"].get<double>();
     for (std::size_t first = 0, last; first < rows.size(); first = last) {
       last = first + 1;
       while (last < rows.size() && rows[last]["iteration"].get<int>() > 1) ++last;
-      methods.push_back(summary(rows, first, last, target));
+      methods.push_back(summary(rows, first, last, facts));
     }
     chart["methods"] = methods;
   }

@@ -31,6 +31,21 @@ double largest_distance(std::vector<Point> const& x, std::vector<Point> const& y
   return std::sqrt(largest);
 }
 
+std::vector<double> distances(std::vector<Point> const& x, std::vector<Point> const& y) {
+  std::vector<double> all(x.size());
+  for (std::size_t i = 0; i < x.size(); ++i)
+    all[i] = std::hypot(x[i][0] - y[i][0], x[i][1] - y[i][1], x[i][2] - y[i][2]);
+  return all;
+}
+
+double StepMeasure::residual(std::vector<Point> const& x) const {
+  std::vector<double> const all = residuals(x);
+  if (all.empty()) return std::numeric_limits<double>::quiet_NaN();
+  double sum = 0;
+  for (double one : all) sum += one * one;
+  return std::sqrt(sum / static_cast<double>(all.size()));
+}
+
 MeshMeasure::MeshMeasure(Scene const& scene, SceneGeometry const& geometry, int step,
                          std::vector<Point> const& before, std::vector<Point> solution,
                          std::optional<double> length)
@@ -61,6 +76,12 @@ MeshMeasure::MeshMeasure(Scene const& scene, SceneGeometry const& geometry, int 
 
 double MeshMeasure::position_error(std::vector<Point> const& x) const {
   return largest_distance(x, solution_) / length_;
+}
+
+std::vector<double> MeshMeasure::errors(std::vector<Point> const& x) const {
+  std::vector<double> all = distances(x, solution_);
+  for (double& one : all) one /= length_;
+  return all;
 }
 
 double MeshMeasure::energy_gap(std::vector<Point> const& x) const {

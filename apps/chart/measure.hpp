@@ -18,6 +18,8 @@ namespace taut {
 
 /// max_i |x_i - y_i|, m; NaN if any of them is.
 double largest_distance(std::vector<Point> const& x, std::vector<Point> const& y);
+/// |x_i - y_i| of each point, m.
+std::vector<double> distances(std::vector<Point> const& x, std::vector<Point> const& y);
 
 class StepMeasure {
 public:
@@ -26,6 +28,13 @@ public:
   virtual double position_error(std::vector<Point> const& x) const = 0;
   /// (E(x) - E(x*)) / (E(before) - E(x*)); NaN where it is not defined.
   virtual double energy_gap(std::vector<Point> const& x) const = 0;
+  /// |x_i - x*_i| / length of each point.
+  virtual std::vector<double> errors(std::vector<Point> const& x) const = 0;
+  /// What is left of the forces at each point, over a characteristic force of it: what methods for
+  /// material points are stopped by in the literature. Empty where no term knows such a force.
+  virtual std::vector<double> residuals(std::vector<Point> const&) const { return {}; }
+  /// Their root mean square; NaN where there are none.
+  double residual(std::vector<Point> const& x) const;
 };
 
 /// Of a step of meshes.
@@ -44,6 +53,7 @@ public:
   double position_error(std::vector<Point> const& x) const override;
   /// NaN with contact.
   double energy_gap(std::vector<Point> const& x) const override;
+  std::vector<double> errors(std::vector<Point> const& x) const override;
   /// E(x) - E(x*), kg m^2, without what contact adds to it.
   double energy_above(std::vector<Point> const& x) const;
 

@@ -61,6 +61,7 @@ public:
   std::unique_ptr<Simulation> whole(Scene const& scene) const override {
     return Simulation::create(scene, geometry_);
   }
+  int grid_steps(Simulation const&) const override { return 1; }
 
 private:
   Simulation& lead() override {
@@ -95,6 +96,23 @@ public:
   }
   std::vector<double> const& mass() const { return nodes_.mass; }
 
+  /// Makes grid and potential of the step that begins in a state, and takes none of it. Throws
+  /// Error if that step has no iteration.
+  void begin(Checkpoint const& before) {
+    struct Begun {};
+    restore(before);
+    try {
+      particles_->first_step([](IterationView const&) { throw Begun(); });
+    } catch (Begun const&) {
+      return;
+    }
+    throw Error("step {} ends where it begins: compare another one with --frame", steps() + 1);
+  }
+  /// In the step that was begun.
+  std::vector<double> residuals(std::vector<Point> const& x) const {
+    return particles_->characteristic_residuals(x);
+  }
+
 private:
   std::unique_ptr<ParticleSimulation> particles_;
   NodesOfStep nodes_;
@@ -102,8 +120,10 @@ private:
 
 class NodeMeasure final : public StepMeasure {
 public:
-  NodeMeasure(std::vector<double> mass, ReferenceStep const& step, std::optional<double> length)
-      : mass_(std::move(mass)), solution_(step.solution) {
+  /// `begun` has begun the step.
+  NodeMeasure(std::vector<double> mass, ReferenceStep const& step, std::optional<double> length,
+              std::unique_ptr<NodesOfParticles> begun)
+      : mass_(std::move(mass)), solution_(step.solution), begun_(std::move(begun)) {
     length_ = length ? *length : distance(step.start);
     if (!(length_ > 0)) {
       throw Error("nothing moves in the first step of frame {}: compare another one with --frame",
@@ -116,6 +136,14 @@ public:
   }
   double energy_gap(std::vector<Point> const&) const override {
     return std::numeric_limits<double>::quiet_NaN();
+  }
+  std::vector<double> errors(std::vector<Point> const& x) const override {
+    std::vector<double> all = distances(x, solution_);
+    for (double& one : all) one /= length_;
+    return all;
+  }
+  std::vector<double> residuals(std::vector<Point> const& x) const override {
+    return begun_->residuals(x);
   }
 
 private:
@@ -131,6 +159,7 @@ private:
 
   std::vector<double> mass_;
   std::vector<Point> solution_;
+  std::unique_ptr<NodesOfParticles> begun_;
   double length_ = 0;
 };
 
@@ -151,13 +180,18 @@ public:
   }
   std::unique_ptr<StepMeasure> measure(ReferenceStep const& step,
                                        std::optional<double> length) const override {
-    return std::make_unique<NodeMeasure>(solver_->mass(), step, length);
+    auto begun = std::make_unique<NodesOfParticles>(reference_, particles_);
+    begun->begin(step.before);
+    return std::make_unique<NodeMeasure>(solver_->mass(), step, length, std::move(begun));
   }
   std::unique_ptr<Simulation> contestant(Scene const& scene) const override {
     return std::make_unique<NodesOfParticles>(scene, particles_);
   }
   std::unique_ptr<Simulation> whole(Scene const& scene) const override {
     return ParticleSimulation::create(scene, particles_);
+  }
+  int grid_steps(Simulation const& whole) const override {
+    return dynamic_cast<ParticleSimulation const&>(whole).frame().steps;
   }
 
 private:

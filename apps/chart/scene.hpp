@@ -6,6 +6,9 @@
 // hardly any particle sees is of no account:
 //
 //   |x - x*|_M / length,   |d|_M^2 = Sum_i m_i |d_i|^2 / Sum_i m_i.
+//
+// Residuals of nodes are those of the potential in fp64 with the nodes that are held when the step
+// begins; what walls hold or let go later, and friction, are not seen.
 #pragma once
 
 #include <taut/apps/chart/trace.hpp>
@@ -35,6 +38,8 @@ public:
   virtual std::unique_ptr<Simulation> contestant(Scene const& scene) const = 0;
   /// The same, whose steps are frames.
   virtual std::unique_ptr<Simulation> whole(Scene const& scene) const = 0;
+  /// Steps of the grid in the last frame of one of these; 1 for meshes.
+  virtual int grid_steps(Simulation const& whole) const = 0;
 };
 
 /// `change` is applied to every scene that is loaded. Throws Error.

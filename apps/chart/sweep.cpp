@@ -17,19 +17,24 @@ std::string sweep_methods(std::filesystem::path const& file, ChartOptions const&
   if (options.frames.size() > 1) throw Error("--frame: a sweep compares one frame, name one");
   int const frame = options.frames.empty() ? std::min(10, whole.frames) : options.frames.front();
   // A method has proven itself well below the target: an error may rise again.
-  TraceLimits const limits{options.target / 10, options.max_seconds, options.repetitions};
+  TraceLimits const limits{options.target / 10, options.max_seconds, options.repetitions,
+                           options.residual};
 
   // One length for all members, the motion at the first value: what a stiff body still moves in a
   // step may be nothing against what every method has to undo of the predicted position.
   std::optional<double> length = options.length;
-  std::string header, table = "value,method,iterations,seconds,position_error,ended\n";
+  std::string header,
+      table =
+          "value,method,iterations,seconds,position_error,residual_iterations,residual_seconds,"
+          "residual,ended\n";
   for (double value : whole.sweep->values) {
     std::vector<std::string> const member{fmt::format("{}={}", whole.sweep->key, value)};
     SceneChanges const changes = with(options.scene.changes, member);
     std::vector<Contestant> const all = contestants(file, changes, methods, options.max_iterations);
     std::unique_ptr<ChartScene> const scene = make_chart_scene(file, changes);
     if (header.empty()) {
-      header = "# kind = sweep\n" + scene->description() + describe_target(options) +
+      header = "# kind = sweep\n" + scene->description() +
+               describe_target(options, whole.particles.has_value()) +
                fmt::format("# key = {}\n# frame = {}\n", whole.sweep->key, frame);
     }
     ReferenceStep const step = scene->advance_to(frame);
@@ -43,11 +48,16 @@ std::string sweep_methods(std::filesystem::path const& file, ChartOptions const&
       auto const simulation = scene->contestant(one.scene);
       Trace const found = trace(*simulation, step, *measure, limits);
       auto const reached = found.reached(options.target);
-      double const last = found.points.empty() ? std::numeric_limits<double>::quiet_NaN()
-                                               : found.points.back().position_error;
+      auto const stopped = found.stopped_by(options.residual);
+      double const unknown = std::numeric_limits<double>::quiet_NaN();
+      double const last = found.points.empty() ? unknown : found.points.back().position_error;
+      auto const cost = [&](std::optional<int> const& k) {
+        if (!k) return std::string(",");
+        return fmt::format("{},{}", *k, field(found.points[*k - 1].seconds));
+      };
       table += fmt::format(
-          "{:g},{},{},{},{},{}\n", value, one.label, reached ? std::to_string(*reached) : "",
-          reached ? field(found.points[*reached - 1].seconds) : "", field(last), found.ended);
+          "{:g},{},{},{},{},{},{}\n", value, one.label, cost(reached), field(last), cost(stopped),
+          field(found.points.empty() ? unknown : found.points.back().residual), found.ended);
       fmt::print("  {:<26} {}\n", one.label,
                  reached ? fmt::format("{} iterations, {:.4g} s", *reached,
                                        found.points[*reached - 1].seconds)

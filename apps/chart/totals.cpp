@@ -3,28 +3,38 @@
 #include <taut/core/report/error.hpp>
 #include <taut/core/report/timer.hpp>
 
+#include <algorithm>
 #include <array>
 #include <limits>
 
 namespace taut {
 namespace {
 
+struct FrameCost {
+  double seconds;
+  int iterations, linear_iterations, grid_steps;
+};
+
 /// A run of a scene by one method.
 struct Total {
   int frames = 0;
+  std::vector<FrameCost> costs;
   int iterations = 0, linear_iterations = 0, converged = 0;
   double seconds = 0;
   std::string ended = "end of scene";
   std::vector<Point> end;
 };
 
-Total run(Simulation& simulation, int frames, double max_seconds) {
+Total run(ChartScene const& scene, Simulation& simulation, int frames, double max_seconds) {
   Total total;
   while (total.frames < frames) {
     Timer const timer;
     try {
       NewtonReport const report = simulation.step();
-      total.seconds += timer.seconds();
+      double const seconds = timer.seconds();
+      total.costs.push_back(
+          {seconds, report.iterations, report.linear_iterations, scene.grid_steps(simulation)});
+      total.seconds += seconds;
       total.iterations += report.iterations;
       total.linear_iterations += report.linear_iterations;
       total.converged += report.converged();
@@ -64,23 +74,33 @@ public:
   Scene const& scene() const { return scene_; }
 
   /// The rows.
-  std::string run() const {
+  std::string run(std::string& costs) const {
     auto const solver = steps_->whole(exact_);
     constexpr double patience = 20;  // for it, in times of the methods' seconds
-    Total const reference = taut::run(*solver, scene_.frames, patience * options_.max_seconds);
+    Total const reference =
+        taut::run(*steps_, *solver, scene_.frames, patience * options_.max_seconds);
     fmt::print("{}: {}, {} frames\n{:<26} {:>8} {:>10} {:>11} {:>11} {:>11}  ended\n", scene_.name,
                steps_->size(), scene_.frames, "", "frames", "seconds", "iterations", "linear",
                "error, m");
     std::string rows;
     for (Contestant const& one : all_) {
       auto const simulation = steps_->whole(one.scene);
-      Total const total = taut::run(*simulation, scene_.frames, options_.max_seconds);
+      Total const total = taut::run(*steps_, *simulation, scene_.frames, options_.max_seconds);
+      int grid_steps = 0;
+      for (std::size_t f = 0; f < total.costs.size(); ++f) {
+        FrameCost const& cost = total.costs[f];
+        grid_steps += cost.grid_steps;
+        costs += fmt::format("{},{},{},{},{},{},{}\n", scene_.name, one.label, f + 1,
+                             field(cost.seconds), cost.iterations, cost.linear_iterations,
+                             cost.grid_steps);
+      }
       bool const comparable = !total.end.empty() && !reference.end.empty();
       double const error = comparable ? largest_distance(total.end, reference.end)
                                       : std::numeric_limits<double>::quiet_NaN();
-      rows += fmt::format("{},{},{},{},{},{},{},{},{},{}\n", scene_.name, one.label, total.frames,
-                          scene_.frames, field(total.seconds), total.iterations,
-                          total.linear_iterations, total.converged, field(error), total.ended);
+      rows += fmt::format("{},{},{},{},{},{},{},{},{},{},{}\n", scene_.name, one.label,
+                          total.frames, scene_.frames, field(total.seconds), total.iterations,
+                          total.linear_iterations, total.converged, grid_steps, field(error),
+                          total.ended);
       fmt::print("{:<26} {:>8} {:>10.4g} {:>11} {:>11} {:>11}  {}\n", one.label, total.frames,
                  total.seconds, total.iterations, total.linear_iterations,
                  comparable ? fmt::format("{:.2e}", error) : "-", total.ended);
@@ -98,7 +118,7 @@ private:
 }  // namespace
 
 std::string totals_of_methods(std::filesystem::path const& file, ChartOptions const& options,
-                              std::vector<ChartMethod> const& methods) {
+                              std::vector<ChartMethod> const& methods, MoreTables& more) {
   std::vector<std::filesystem::path> files{file};
   for (std::string const& scene : options.with) files.push_back(find_scene(scene));
   // Everything is checked before anything is measured.
@@ -108,11 +128,21 @@ std::string totals_of_methods(std::filesystem::path const& file, ChartOptions co
   for (std::size_t k = 1; k < scenes.size(); ++k)
     header += fmt::format("# with = {}\n", scenes[k].scene().name);
   header += fmt::format("# seconds_per_method = {:g}\n", options.max_seconds);
-  std::string rows;
-  for (Totals const& one : scenes) rows += one.run();
+  if (!options.relative.empty()) {
+    ChartMethod const unit =
+        parse_method(options.relative, scenes.front().scene().particles.has_value());
+    bool const runs = std::any_of(methods.begin(), methods.end(), [&](ChartMethod const& method) {
+      return method.label == unit.label;
+    });
+    if (!runs) throw Error("--relative {}: it is none of the --methods: add it", options.relative);
+    header += fmt::format("# relative_to = {}\n", unit.label);
+  }
+  std::string rows, &costs = more["frames.csv"];
+  costs = "scene,method,frame,seconds,iterations,linear_iterations,grid_steps\n";
+  for (Totals const& one : scenes) rows += one.run(costs);
   return header +
          "scene,method,frames,of_frames,seconds,iterations,linear_iterations,converged_frames,"
-         "error_m,ended\n" +
+         "grid_steps,error_m,ended\n" +
          rows;
 }
 

@@ -63,15 +63,27 @@ bool is_sampled(std::size_t iteration) {
 void record(Trace& trace, Simulation& simulation, StepMeasure const& measure,
             TraceLimits const& limits) {
   double const unknown = std::numeric_limits<double>::quiet_NaN();
+  int const last_kept =
+      limits.keep.empty() ? -1 : *std::max_element(limits.keep.begin(), limits.keep.end());
+  auto const keeps = [&](int k) {
+    return std::find(limits.keep.begin(), limits.keep.end(), k) != limits.keep.end();
+  };
+  std::vector<Point> end;
+  if (last_kept >= 0) end = simulation.positions();
+  if (keeps(0)) trace.kept[0] = end;
   Timer const timer;
   auto const observe = [&](IterationView const& view) {
     std::vector<Point> const x = view.positions();
-    double const error = measure.position_error(x);
-    bool const ends = error <= limits.lowest || timer.seconds() > limits.max_seconds;
+    double const error = measure.position_error(x), residual = measure.residual(x);
+    bool const accurate = error <= limits.lowest && !(residual >= limits.residual);
+    bool const ends = accurate || timer.seconds() > limits.max_seconds;
     bool const sampled = ends || is_sampled(trace.points.size() + 1);
-    trace.points.push_back({unknown, error, sampled ? measure.energy_gap(x) : unknown});
+    trace.points.push_back({unknown, error, sampled ? measure.energy_gap(x) : unknown, residual});
+    int const k = static_cast<int>(trace.points.size());
+    if (keeps(k)) trace.kept[k] = x;
+    if (k < last_kept) end = x;
     if (!ends) return;
-    trace.ended = error <= limits.lowest ? "accurate" : "budget";
+    trace.ended = accurate ? "accurate" : "budget";
     throw Enough();
   };
   try {
@@ -81,6 +93,7 @@ void record(Trace& trace, Simulation& simulation, StepMeasure const& measure,
     // The reference went through this step from the same state, so the scene is not to blame.
     trace.ended = "not finite";
   }
+  for (int k : limits.keep) trace.kept.try_emplace(k, end);
 }
 
 void take_time(Trace& trace, Simulation& simulation) {
@@ -138,6 +151,31 @@ std::optional<int> Trace::reached(double target) const {
   while (first > 0 && points[first - 1].position_error <= target) --first;
   if (first == points.size()) return {};
   return static_cast<int>(first) + 1;
+}
+
+std::optional<int> Trace::stopped_by(double tolerance) const {
+  auto const below = [&](TracePoint const& p) { return p.residual < tolerance; };
+  auto const first = std::find_if(points.begin(), points.end(), below);
+  if (first == points.end()) return {};
+  return static_cast<int>(first - points.begin()) + 1;
+}
+
+std::vector<int> linear_iterations(std::function<std::unique_ptr<Simulation>(int)> const& limited,
+                                   ReferenceStep const& reference, std::size_t iterations,
+                                   double max_seconds) {
+  std::vector<int> all;
+  Timer const timer;
+  for (std::size_t k = 1; k <= iterations && timer.seconds() <= max_seconds; ++k) {
+    auto const simulation = limited(static_cast<int>(k));
+    restore(*simulation, reference.before);
+    try {
+      all.push_back(simulation->step().linear_iterations);
+    } catch (Error const&) {
+      break;
+    }
+    if (all.back() == 0) return {};
+  }
+  return all;
 }
 
 Trace trace(Simulation& simulation, ReferenceStep const& reference, StepMeasure const& measure,

@@ -133,6 +133,26 @@ public:
     grid_.rebuild(particles_, potential_.template term<ParticleTerms>().material_count());
     return nodes_at(grid_.rest());
   }
+  std::vector<double> characteristic_residuals(std::vector<Point> const& x) const override {
+    VectorField<P::position, S> const at("chart_x", x.size());
+    VectorField<P::real, S> const g("chart_gradient", x.size());
+    Array<double, S> const force("characteristic_force", x.size());
+    auto const host = Kokkos::create_mirror_view(at);
+    for (std::size_t i = 0; i < x.size(); ++i)
+      for (std::size_t c = 0; c < 3; ++c) host(i, c) = x[i][c];
+    Kokkos::deep_copy(at, host);
+    potential_.gradient(at, g);
+    potential_.characteristic_force(force);
+    double const h = potential_.scale().time_step;
+    std::vector<Point> const gradient = read(g);
+    auto const unit = Kokkos::create_mirror_view_and_copy(Kokkos::HostSpace(), force);
+    std::vector<double> residuals(x.size(), 0.0);
+    for (std::size_t i = 0; i < x.size(); ++i) {
+      Point const& own = gradient[i];
+      if (unit(i) > 0) residuals[i] = std::hypot(own[0], own[1], own[2]) / (h * h * unit(i));
+    }
+    return residuals;
+  }
 
   double time() const override { return time_; }
   int steps() const override { return steps_; }

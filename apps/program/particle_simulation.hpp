@@ -41,6 +41,10 @@ public:
   /// Of the step that was taken last; and at rest, of that to come.
   virtual NodesOfStep nodes() const = 0;
   virtual NodesOfStep start_nodes() = 0;
+  /// Of nodes at x in the step of the grid that was begun last, before its end: the force that is
+  /// left at each, over the characteristic one (integrators/characteristic_norm.hpp); 0 where
+  /// there is none. Their root mean square is the norm that HOT stops by.
+  virtual std::vector<double> characteristic_residuals(std::vector<Point> const& x) const = 0;
   /// Of each point of the scene's result (result_mesh), in the order of particle_scalars().
   virtual std::vector<std::vector<double>> scalars() const = 0;
   /// The grid of the last step, none before the first, and the particles as they are.

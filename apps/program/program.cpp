@@ -119,11 +119,24 @@ int taut::run_program(int argc, char** argv) {
                       "also the same steps, from the same states, without contact");
   chart_app->add_flag("--sweep", chart.sweep, "time to --target against the scene's [sweep]");
   chart_app->add_flag("--totals", chart.totals, "the seconds of whole scenes");
+  chart_app->add_option("--relative", chart.relative,
+                        "one of the methods, whose seconds are the unit of --totals");
+  chart_app->add_flag("--matrices", chart.matrices,
+                      "how full the levels of hierarchies over material points are");
+  chart_app->add_option("--levels", chart.levels, "of --matrices")->capture_default_str();
+  chart_app->add_flag("--linear", chart.linear,
+                      "also linear iterations up to each iteration, by many more runs");
+  add_list(*chart_app, "--fields", chart.fields,
+           "iterations whose errors and residuals are drawn point by point, from 0");
   chart_app->add_flag("--stability", chart.stability,
                       "how far --policies bring the scene until a step is not clean");
   add_list(*chart_app, "--policies", chart.policies,
            "KEY=VALUE[:KEY=VALUE...], KEY of [contact] or TABLE.KEY; default, paper; all");
   chart_app->add_option("--target", chart.target, "error that counts as solved")
+      ->capture_default_str();
+  chart_app
+      ->add_option("--residual", chart.residual,
+                   "of material points, the characteristic norm that counts as solved")
       ->capture_default_str();
   chart_app->add_option("--length", chart.length,
                         "m, what errors are relative to (the motion in the step)");

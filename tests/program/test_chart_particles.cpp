@@ -4,6 +4,7 @@
 
 #include <catch2/catch_test_macros.hpp>
 #include <catch2/matchers/catch_matchers_exception.hpp>
+#include <catch2/matchers/catch_matchers_floating_point.hpp>
 #include <catch2/matchers/catch_matchers_string.hpp>
 
 #include "chart_data.hpp"
@@ -12,6 +13,7 @@ using namespace taut;
 using namespace taut::test;
 using Catch::Matchers::ContainsSubstring;
 using Catch::Matchers::MessageMatches;
+using Catch::Matchers::WithinRel;
 
 namespace {
 
@@ -69,6 +71,67 @@ TEST_CASE("minimisers over particles meet at the solution of the reference", "[c
   CHECK(data.of("PN-PCG").size() < data.of("DK block_jacobi").size());
 }
 
+TEST_CASE("residuals are what HOT's rule stops by", "[chart][mpm]") {
+  ScratchFolder const folder;
+  ChartOptions options = options_for(folder, bar);
+  options.methods = {"hot:stopping=characteristic_norm:tolerance=1e-8", "lbfgs"};
+  options.residual = 1e-8;
+  options.lowest = 1e-3;
+  Data const data = chart(options);
+  CHECK_THAT(data.header, ContainsSubstring("# residual = 1e-08\n"));
+  std::vector<Row> const rows = data.of("HOT characteristic_norm tolerance=1e-8");
+  REQUIRE(rows.size() > 2);
+  CHECK(number(rows.back(), "residual") < 1e-8);
+  for (std::size_t k = 0; k + 1 < rows.size(); ++k) CHECK(number(rows[k], "residual") >= 1e-8);
+  // Another method goes on until both are small.
+  Row const last = data.of("L-BFGS").back();
+  CHECK(last.at("ended") == "accurate");
+  CHECK(number(last, "residual") < 1e-8);
+  CHECK(number(last, "position_error") <= 1e-3);
+}
+
+TEST_CASE("linear iterations of Newton are counted up to each of its own", "[chart][mpm]") {
+  ScratchFolder const folder;
+  ChartOptions options = options_for(folder, bar);
+  options.methods = {"pn_pcg", "lbfgs"};
+  options.linear = true;
+  Data const data = chart(options);
+  double before = 0;
+  for (Row const& row : data.of("PN-PCG")) {
+    CHECK(number(row, "linear_iterations") > before);
+    before = number(row, "linear_iterations");
+  }
+  for (Row const& row : data.of("L-BFGS")) CHECK(row.at("linear_iterations").empty());
+}
+
+TEST_CASE("fields have the errors and residuals of an iteration point by point", "[chart][mpm]") {
+  ScratchFolder const folder;
+  ChartOptions options = options_for(folder, bar);
+  options.methods = {"lbfgs"};
+  options.fields = {0, 2, 1000};
+  Data const data = chart(options), fields = read_data(options.out / "fields.csv");
+  std::vector<Row> const start = fields.where("iteration", "0"),
+                         second = fields.where("iteration", "2"),
+                         end = fields.where("iteration", "1000");
+  REQUIRE(start.size() > 100);
+  REQUIRE(second.size() == start.size());
+  REQUIRE(end.size() == start.size());
+  auto const rms = [](std::vector<Row> const& rows, char const* column) {
+    double sum = 0;
+    for (Row const& row : rows) sum += number(row, column) * number(row, column);
+    return std::sqrt(sum / static_cast<double>(rows.size()));
+  };
+  CHECK_THAT(rms(second, "residual"), WithinRel(number(data.rows[1], "residual"), 1e-4));
+  // After its end, the end.
+  CHECK_THAT(rms(end, "residual"), WithinRel(number(data.rows.back(), "residual"), 1e-4));
+  CHECK(rms(second, "error") < rms(start, "error"));
+  CHECK(rms(end, "error") < 1e-5);
+  for (Row const& row : start) {
+    double const cells = number(row, "x") / 0.1;
+    CHECK(std::abs(cells - std::round(cells)) < 1e-4);
+  }
+}
+
 TEST_CASE("a sweep over a stiffness of particles", "[chart][mpm]") {
   ScratchFolder const folder;
   ChartOptions options = options_for(folder, bar);
@@ -80,6 +143,9 @@ TEST_CASE("a sweep over a stiffness of particles", "[chart][mpm]") {
     CAPTURE(row.at("method"), row.at("value"));
     CHECK(number(row, "position_error") <= options.target / 10);
     CHECK(number(row, "iterations") >= 1);
+    CHECK(number(row, "residual") < options.residual);
+    CHECK(number(row, "residual_iterations") >= 1);
+    CHECK(number(row, "residual_seconds") > 0);
   }
 }
 
@@ -115,8 +181,24 @@ TEST_CASE("totals run whole scenes, each method by its own rule", "[chart][mpm]"
     CHECK((number(row, "error_m") < 1e-3) == enough);
     CHECK((number(row, "linear_iterations") > 0) == (row.at("method") == "PN-PCG"));
   }
-  options.frames = {1};
+  Data const frames = read_data(options.out / "frames.csv");
+  for (Row const& row : data.rows) {
+    std::vector<Row> const own = frames.where("method", row.at("method"));
+    REQUIRE(own.size() == 3);
+    for (char const* column : {"iterations", "linear_iterations", "grid_steps"}) {
+      double sum = 0;
+      for (Row const& frame : own) sum += number(frame, column);
+      CHECK(sum == number(row, column));
+    }
+    CHECK(number(row, "grid_steps") >= 3);
+  }
   options.force = true;
+  options.relative = "hot";
+  CHECK_THROWS_MATCHES(chart_command(options), Error,
+                       MessageMatches(ContainsSubstring("none of the --methods")));
+  options.relative = "lbfgs";
+  CHECK_THAT(chart(options).header, ContainsSubstring("# relative_to = L-BFGS\n"));
+  options.frames = {1};
   CHECK_THROWS_MATCHES(chart_command(options), Error,
                        MessageMatches(ContainsSubstring("time.frames=N")));
 }

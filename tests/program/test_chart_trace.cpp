@@ -18,7 +18,7 @@ public:
   std::vector<double> errors;
   Stop stop = Stop::stalled;
   bool throws = false;
-  int runs = 0, copies = 0;
+  int runs = 0, copies = 0, linear = 0;
   std::vector<Point> solution;
 
   NewtonReport step(IterationObserver const& observer) override {
@@ -34,6 +34,7 @@ public:
     if (throws) throw Error("the energy is not a number any more");
     NewtonReport report;
     report.stop = stop;
+    report.linear_iterations = linear;
     return report;
   }
   double time() const override { return 0; }
@@ -47,6 +48,28 @@ public:
   }
   void restore(Checkpoint const& checkpoint) override { restored = checkpoint; }
   Checkpoint restored;
+};
+
+/// Residuals that are an error of position by a factor.
+class Tenfold final : public StepMeasure {
+public:
+  explicit Tenfold(StepMeasure const& errors) : errors_(errors) {}
+  double length() const override { return errors_.length(); }
+  double position_error(std::vector<Point> const& x) const override {
+    return errors_.position_error(x);
+  }
+  double energy_gap(std::vector<Point> const& x) const override { return errors_.energy_gap(x); }
+  std::vector<double> errors(std::vector<Point> const& x) const override {
+    return errors_.errors(x);
+  }
+  std::vector<double> residuals(std::vector<Point> const& x) const override {
+    std::vector<double> all = errors_.errors(x);
+    for (double& one : all) one *= 10;
+    return all;
+  }
+
+private:
+  StepMeasure const& errors_;
 };
 
 struct Stage {
@@ -96,6 +119,51 @@ TEST_CASE("a trace records every iteration and times the same ones", "[chart]") 
   CHECK(t.reached(0.5) == 2);
   CHECK(t.reached(2) == 1);
   CHECK_FALSE(t.reached(1e-3));
+}
+
+TEST_CASE("a trace that has residuals goes on until these are small, too", "[chart]") {
+  Stage s;
+  s.simulation.errors = {0.2, 0.01, 0.002, 0.003, 0.0005, 0.0001};
+  CHECK(std::isnan(trace(s.simulation, s.reference, s.measure, {}).points[0].residual));
+  Trace const t =
+      trace(s.simulation, s.reference, Tenfold(s.measure), {.lowest = 0.05, .residual = 0.1});
+  CHECK(t.ended == "accurate");
+  REQUIRE(t.points.size() == 3);
+  for (std::size_t k = 0; k < 3; ++k)
+    CHECK_THAT(t.points[k].residual, WithinRel(10 * s.simulation.errors[k] / 0.25, 1e-9));
+  CHECK(t.stopped_by(0.1) == 3);
+  CHECK(t.stopped_by(0.5) == 2);
+  CHECK(t.stopped_by(0.09) == 3);
+  CHECK_FALSE(t.stopped_by(0.05));
+}
+
+TEST_CASE("points are kept of the iterations that were asked for", "[chart]") {
+  Stage s;
+  s.simulation.errors = {0.2, 0.1, 0.05};
+  Trace const t = trace(s.simulation, s.reference, s.measure, {.keep = {0, 2, 9}});
+  REQUIRE(t.kept.size() == 3);
+  auto const off = [&](int k) { return s.measure.position_error(t.kept.at(k)); };
+  CHECK(off(0) == 0);  // this simulation says that it starts at the solution
+  CHECK_THAT(off(2), WithinRel(0.1 / 0.25, 1e-9));
+  CHECK_THAT(off(9), WithinRel(0.05 / 0.25, 1e-9));
+  CHECK(trace(s.simulation, s.reference, s.measure, {}).kept.empty());
+}
+
+TEST_CASE("linear iterations are counted by steps that end early", "[chart]") {
+  Stage s;
+  std::vector<int> asked;
+  int each = 7;
+  auto const limited = [&](int k) {
+    asked.push_back(k);
+    auto simulation = std::make_unique<Scripted>();
+    simulation->linear = each * k;
+    return simulation;
+  };
+  CHECK(linear_iterations(limited, s.reference, 3, 60) == std::vector<int>{7, 14, 21});
+  CHECK(asked == std::vector<int>{1, 2, 3});
+  each = 0;  // a method that solves none is not asked again
+  CHECK(linear_iterations(limited, s.reference, 3, 60).empty());
+  CHECK(asked.size() == 4);
 }
 
 TEST_CASE("the state is rounded to what a method keeps", "[chart]") {
