@@ -16,6 +16,9 @@ if(PROJECT_IS_TOP_LEVEL)
   endif()
 endif()
 include(GNUInstallDirs)
+# What most sources include and what is slow to read, parsed once: the intrinsics behind the packs of Kokkos alone are a
+# second of each source. Not in it is what few sources need (JSON, Eigen): reading a larger file back costs all of them.
+set(taut_precompiled <Kokkos_Core.hpp> <Kokkos_SIMD.hpp> <filesystem> <fmt/ranges.h>)
 if(TAUT_BACKEND STREQUAL "cuda")
   set(CMAKE_DISABLE_PRECOMPILE_HEADERS ON)  # ours is Kokkos's header, which here only nvcc can read
 endif()
