@@ -66,6 +66,19 @@ function(taut_reaches_kokkos file result)
   set(${result} ${known} PARENT_SCOPE)
 endfunction()
 
+# Compiles the sources of TARGET SIZE at a time, but for those that match APART, which take long enough by themselves:
+# what several include and instantiate is then compiled once. Names without linkage must be unique among them.
+function(taut_join target size)
+  cmake_parse_arguments(PARSE_ARGV 2 join "" APART "")
+  if(NOT TAUT_JOINT OR TAUT_BACKEND STREQUAL "cuda")
+    return()
+  endif()
+  set_target_properties(${target} PROPERTIES UNITY_BUILD ON UNITY_BUILD_MODE BATCH UNITY_BUILD_BATCH_SIZE ${size})
+  get_target_property(sources ${target} SOURCES)
+  list(FILTER sources INCLUDE REGEX "(${join_APART})\\.cpp$")
+  set_source_files_properties(${sources} PROPERTIES SKIP_UNITY_BUILD_INCLUSION ON)
+endfunction()
+
 # Sets TARGET up as one of ours: language, warnings.
 function(taut_target target)
   target_link_libraries(${target} PUBLIC taut_usage)
