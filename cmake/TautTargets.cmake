@@ -16,6 +16,9 @@ if(PROJECT_IS_TOP_LEVEL)
   endif()
 endif()
 include(GNUInstallDirs)
+# What most sources include and what is slow to read, parsed once: the intrinsics behind the packs of Kokkos alone are a
+# second of each source. Not in it is what few sources need (JSON, Eigen): reading a larger file back costs all of them.
+set(taut_precompiled <Kokkos_Core.hpp> <Kokkos_SIMD.hpp> <filesystem> <fmt/ranges.h>)
 if(TAUT_BACKEND STREQUAL "cuda")
   set(CMAKE_DISABLE_PRECOMPILE_HEADERS ON)  # ours is Kokkos's header, which here only nvcc can read
 endif()
@@ -61,6 +64,19 @@ function(taut_reaches_kokkos file result)
     set_property(GLOBAL PROPERTY "taut_reaches_kokkos ${file}" ${known})
   endif()
   set(${result} ${known} PARENT_SCOPE)
+endfunction()
+
+# Compiles the sources of TARGET SIZE at a time, but for those that match APART, which take long enough by themselves:
+# what several include and instantiate is then compiled once. Names without linkage must be unique among them.
+function(taut_join target size)
+  cmake_parse_arguments(PARSE_ARGV 2 join "" APART "")
+  if(NOT TAUT_JOINT OR TAUT_BACKEND STREQUAL "cuda")
+    return()
+  endif()
+  set_target_properties(${target} PROPERTIES UNITY_BUILD ON UNITY_BUILD_MODE BATCH UNITY_BUILD_BATCH_SIZE ${size})
+  get_target_property(sources ${target} SOURCES)
+  list(FILTER sources INCLUDE REGEX "(${join_APART})\\.cpp$")
+  set_source_files_properties(${sources} PROPERTIES SKIP_UNITY_BUILD_INCLUSION ON)
 endfunction()
 
 # Sets TARGET up as one of ours: language, warnings.

@@ -1,5 +1,5 @@
 // Elastic terms with the curvature filters that are not the default, for the source files that
-// instantiate them: one per model.
+// instantiate them: models alike share one, and what both need is compiled once.
 #pragma once
 
 #include <taut/apps/program/elastic_terms_impl.hpp>

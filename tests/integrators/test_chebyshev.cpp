@@ -15,13 +15,13 @@ using namespace taut;
 
 namespace {
 
-using Method = Chebyshev<AnyPreconditioner, SufficientDecrease, DecrementWindow, Fp64>;
+using ByChebyshev = Chebyshev<AnyPreconditioner, SufficientDecrease, DecrementWindow, Fp64>;
 
 }  // namespace
 
 TEST_CASE("on a quadratic iterates are those of the recursion") {
   toy::Chain<toy::Anisotropic> chain({.size = 20}, {.stiffest = 40});
-  Method::Params params;
+  ByChebyshev::Params params;
   params.chebyshev = {.rho = 0.8, .delay = 4};
   params.preconditioner = AnyPreconditioner<Fp64>::by_name("identity");
   params.stop.tolerance = 0;
@@ -32,7 +32,7 @@ TEST_CASE("on a quadratic iterates are those of the recursion") {
   toy::Chain<toy::Anisotropic>::Positions const before("before", n);
   double omega = 1, worst = 0, travel = 0;
   auto const x = chain.start();
-  auto const report = Method(params).minimise(chain, x, [&](auto const& step) {
+  auto const report = ByChebyshev(params).minimise(chain, x, [&](auto const& step) {
     chain.gradient(now, g);
     chain.product(now, g, hg);
     double gg = 0, ghg = 0;
@@ -66,12 +66,12 @@ TEST_CASE("Chebyshev finds the minimum, with all preconditioners") {
   CAPTURE(preconditioner, rho);
   toy::Chain<toy::Barrier> chain;
   auto const x = chain.start();
-  Method::Params params;
+  ByChebyshev::Params params;
   params.chebyshev.rho = rho;
   params.preconditioner = AnyPreconditioner<Fp64>::by_name(preconditioner);
   params.stop.tolerance = 1e-5;
   params.budget.max_iterations = 20000;
-  auto const report = Method(params).minimise(chain, x, [](auto const& iteration) {
+  auto const report = ByChebyshev(params).minimise(chain, x, [](auto const& iteration) {
     CHECK(iteration.slope < 0);
     CHECK(iteration.energy_change <= 0);
   });
@@ -81,12 +81,12 @@ TEST_CASE("Chebyshev finds the minimum, with all preconditioners") {
 
 TEST_CASE("with a measured radius it needs a third of the iterations of gradient descent") {
   toy::Chain<toy::Anisotropic> chain({.size = 20}, {.stiffest = 60});
-  Method::Params params;
+  ByChebyshev::Params params;
   params.chebyshev.rho = 0;
   params.preconditioner = AnyPreconditioner<Fp64>::by_name("jacobi");
   params.stop.tolerance = 1e-4;
   params.budget.max_iterations = 4000;
-  auto const accelerated = Method(params).minimise(chain, chain.start());
+  auto const accelerated = ByChebyshev(params).minimise(chain, chain.start());
   CHECK(accelerated.converged());
 
   using Gradient = Ncg<AnyBeta, AnyPreconditioner, SufficientDecrease, DecrementWindow, Fp64>;

@@ -16,7 +16,7 @@ using namespace taut;
 
 namespace {
 
-using Method = Lbfgs<AnyPreconditioner, SufficientDecrease, DecrementWindow, Fp64>;
+using ByLbfgs = Lbfgs<AnyPreconditioner, SufficientDecrease, DecrementWindow, Fp64>;
 using Numbers = std::vector<double>;
 
 template <class Field>
@@ -70,7 +70,7 @@ TEST_CASE("directions are those of the two-loop recursion, also after a rejected
   CAPTURE(window);
   // Not convex: s'y is negative now and then.
   toy::Chain<toy::Quartic> chain({.size = 12});
-  Method::Params params;
+  ByLbfgs::Params params;
   params.lbfgs.window = int(window);
   params.lbfgs.least_curvature = 0.1;
   params.preconditioner = AnyPreconditioner<Fp64>::by_name("identity");
@@ -87,7 +87,7 @@ TEST_CASE("directions are those of the two-loop recursion, also after a rejected
   std::deque<Pair> pairs;
   int rejected = 0;
   double worst = 0;
-  auto const report = Method(params).minimise(chain, x, [&](auto const& step) {
+  auto const report = ByLbfgs(params).minimise(chain, x, [&](auto const& step) {
     Numbers const p = two_loops(pairs, g), to = numbers(step.x), g_to = gradient(step.x);
     Pair const pair{plus(to, -1, from), plus(g_to, -1, g)};
     Numbers const off = plus(pair.s, -step.length, p);
@@ -151,11 +151,11 @@ TEST_CASE("L-BFGS finds the minimum, with all preconditioners") {
   CAPTURE(preconditioner);
   toy::Chain<toy::Barrier> chain;
   auto const x = chain.start();
-  Method::Params params;
+  ByLbfgs::Params params;
   params.lbfgs.newton_step = newton_step;
   params.preconditioner = AnyPreconditioner<Fp64>::by_name(preconditioner);
   params.stop.tolerance = 1e-5;
-  auto const report = Method(params).minimise(chain, x, [](auto const& iteration) {
+  auto const report = ByLbfgs(params).minimise(chain, x, [](auto const& iteration) {
     CHECK(iteration.slope < 0);
     CHECK(iteration.energy_change < 1e-12);  // but for round-off
   });
@@ -164,7 +164,7 @@ TEST_CASE("L-BFGS finds the minimum, with all preconditioners") {
 }
 
 TEST_CASE("a window that cannot be kept is refused") {
-  Method::Params params;
+  ByLbfgs::Params params;
   params.lbfgs.window = GENERATE(0, 21);
-  CHECK_THROWS_WITH(Method(params), Catch::Matchers::ContainsSubstring("choose 1 to 20"));
+  CHECK_THROWS_WITH(ByLbfgs(params), Catch::Matchers::ContainsSubstring("choose 1 to 20"));
 }

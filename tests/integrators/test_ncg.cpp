@@ -16,7 +16,7 @@ using Catch::Matchers::WithinRel;
 namespace {
 
 template <class LineSearch = SufficientDecrease>
-using Method = Ncg<AnyBeta, AnyPreconditioner, LineSearch, DecrementWindow, Fp64>;
+using NcgOfAnyBeta = Ncg<AnyBeta, AnyPreconditioner, LineSearch, DecrementWindow, Fp64>;
 
 }  // namespace
 
@@ -29,13 +29,13 @@ TEST_CASE("all betas find the minimum, with all preconditioners") {
   auto const x = chain.start();
   double const before = chain.value(x);
 
-  Method<>::Params params;
+  NcgOfAnyBeta<>::Params params;
   params.beta = AnyBeta(beta);
   params.preconditioner = AnyPreconditioner<Fp64>::by_name(preconditioner);
   params.stop.tolerance = 1e-5;
   params.budget.max_iterations = 20000;
   double energy = 0;
-  auto const report = Method<>(params).minimise(chain, x, [&](auto const& iteration) {
+  auto const report = NcgOfAnyBeta<>(params).minimise(chain, x, [&](auto const& iteration) {
     CHECK(iteration.slope < 0);
     CHECK(iteration.energy_change <= 0);
     energy += iteration.energy_change;
@@ -58,11 +58,11 @@ TEST_CASE("a function that is not convex") {
   CAPTURE(beta);
   toy::Chain<toy::Quartic> chain;
   auto const x = chain.start();
-  Method<>::Params params;
+  NcgOfAnyBeta<>::Params params;
   params.beta = AnyBeta(beta);
   params.stop.tolerance = 1e-6;
   params.budget.max_iterations = 5000;
-  auto const report = Method<>(params).minimise(
+  auto const report = NcgOfAnyBeta<>(params).minimise(
       chain, x, [](auto const& iteration) { CHECK(iteration.slope < 0); });
   CHECK(report.converged());
   CHECK(report.backtracks > 0);
@@ -108,17 +108,18 @@ TEST_CASE("on a quadratic with exact steps all betas are linear CG") {
 
   std::string const beta = GENERATE("dk", "fr", "prp", "prp+", "hs", "cd", "ls", "hz", "bfgs");
   CAPTURE(beta);
-  Method<ExactLineSearch>::Params params;
+  NcgOfAnyBeta<ExactLineSearch>::Params params;
   params.beta = AnyBeta(beta);
   params.preconditioner = AnyPreconditioner<Fp64>::by_name(preconditioner);
   params.stop.tolerance = 0;
   params.budget.max_iterations = 3 * n + 6;  // a few for what round-off has cost
   auto const x = chain.start();
-  auto const report = Method<ExactLineSearch>(params).minimise(chain, x, [&](auto const& step) {
-    // Later ones are a small difference of what round-off has made of conjugacy.
-    if (step.index < 10)
-      CHECK_THAT(step.energy_change, WithinRel(expected[std::size_t(step.index)], 1e-6));
-  });
+  auto const report =
+      NcgOfAnyBeta<ExactLineSearch>(params).minimise(chain, x, [&](auto const& step) {
+        // Later ones are a small difference of what round-off has made of conjugacy.
+        if (step.index < 10)
+          CHECK_THAT(step.energy_change, WithinRel(expected[std::size_t(step.index)], 1e-6));
+      });
   CHECK(report.restarts.total() == 0);
   CHECK(toy::distance_to_minimum(chain, x) < 1e-5);
 }

@@ -18,7 +18,7 @@ using Catch::Matchers::WithinRel;
 namespace {
 
 template <class LineSearch = SufficientDecrease>
-using Method = Ncg<DaiKou, BlockJacobi, LineSearch, DecrementWindow, Fp64>;
+using DaiKouNcg = Ncg<DaiKou, BlockJacobi, LineSearch, DecrementWindow, Fp64>;
 
 constexpr double nan = std::numeric_limits<double>::quiet_NaN();
 
@@ -55,7 +55,7 @@ TEST_CASE("a cut step is followed by a restart") {
   toy::Chain<toy::Barrier> chain;
   auto const x = chain.start();
   bool cut = false, any = false;
-  auto const report = Method<>().minimise(chain, x, [&](auto const& step) {
+  auto const report = DaiKouNcg<>().minimise(chain, x, [&](auto const& step) {
     if (cut) CHECK(step.beta == 0);
     // Newton's step would be longer than half of what is valid.
     cut = step.length < -step.slope / step.curvature * (1 - 1e-12);
@@ -73,7 +73,7 @@ TEST_CASE("prescribed unknowns that arrive in pieces") {
   toy::Chain<toy::Barrier> chain(params);
   auto const x = chain.start();
   auto const start = values(chain.start());
-  auto const report = Method<>().minimise(chain, x);
+  auto const report = DaiKouNcg<>().minimise(chain, x);
   CHECK(report.restarts.prescribed == 5);
   CHECK(report.converged());
   CHECK(report.iterations > 5);
@@ -89,7 +89,7 @@ TEST_CASE("prescribed motion that is still to come is not mistaken for convergen
   params.travel = 0.2;
   toy::Chain<toy::Anisotropic> chain(params);
   double const pin = rest(0, 2);
-  auto const report = Method<>().minimise(chain, rest);
+  auto const report = DaiKouNcg<>().minimise(chain, rest);
   CHECK(report.restarts.prescribed == 3);
   CHECK(report.converged());
   CHECK_THAT(rest(0, 2), WithinAbs(pin + 0.2, 1e-14));
@@ -104,7 +104,7 @@ TEST_CASE("nothing to do") {
   for (int i = 0; i < 3; ++i)
     for (int c = 0; c < 3; ++c) x(i, c) = i * rest[c];
   auto const before = values(x);
-  auto const report = Method<>().minimise(chain, x);
+  auto const report = DaiKouNcg<>().minimise(chain, x);
   CHECK(report.stop == Stop::converged_by_gradient);
   CHECK(report.iterations == 0);
   CHECK(report.error_estimate_m == report.error_floor_m);
@@ -115,23 +115,23 @@ TEST_CASE("nothing to do") {
 TEST_CASE("at the minimum to round-off it is converged, not stalled") {
   toy::Chain<toy::Quartic> chain;
   auto const x = toy::minimum(chain, chain.start());
-  auto const report = Method<>().minimise(chain, x);
+  auto const report = DaiKouNcg<>().minimise(chain, x);
   CHECK(report.converged());
   CHECK(report.error_estimate_m < 1e-10);
 }
 
 TEST_CASE("the budget is not convergence") {
   toy::Chain<toy::Quartic> chain;
-  Method<>::Params params;
+  DaiKouNcg<>::Params params;
   params.budget.max_iterations = 5;
-  auto report = Method<>(params).minimise(chain, chain.start());
+  auto report = DaiKouNcg<>(params).minimise(chain, chain.start());
   CHECK(report.stop == Stop::budget_iterations);
   CHECK(report.iterations == 5);
   CHECK_FALSE(report.converged());
   CHECK(std::isfinite(report.error_estimate_m));
 
   params.budget = {.max_seconds = 0};
-  report = Method<>(params).minimise(chain, chain.start());
+  report = DaiKouNcg<>(params).minimise(chain, chain.start());
   CHECK(report.stop == Stop::budget_seconds);
   CHECK(report.iterations == 0);
 }
@@ -140,7 +140,7 @@ TEST_CASE("a gradient that is not a number leaves the last good iterate") {
   SECTION("at once") {
     Breaking chain;
     auto const x = chain.start();
-    auto const report = Method<>().minimise(chain, x);
+    auto const report = DaiKouNcg<>().minimise(chain, x);
     CHECK(report.stop == Stop::non_finite);
     CHECK(values(x) == values(chain.start()));
   }
@@ -149,7 +149,7 @@ TEST_CASE("a gradient that is not a number leaves the last good iterate") {
     chain.breaks_at = 3;
     auto const x = chain.start();
     std::vector<std::vector<double>> iterates;
-    auto const report = Method<NewtonStep>().minimise(
+    auto const report = DaiKouNcg<NewtonStep>().minimise(
         chain, x, [&](auto const& step) { iterates.push_back(values(step.x)); });
     CHECK(report.stop == Stop::non_finite);
     CHECK(report.iterations == 3);
@@ -161,7 +161,7 @@ TEST_CASE("a gradient that is not a number leaves the last good iterate") {
     chain.breaks_at = 4;
     auto const x = chain.start();
     std::vector<std::vector<double>> iterates;
-    auto const report = Method<>().minimise(
+    auto const report = DaiKouNcg<>().minimise(
         chain, x, [&](auto const& step) { iterates.push_back(values(step.x)); });
     CHECK(report.stop == Stop::non_finite);
     CHECK_FALSE(report.converged());

@@ -11,7 +11,7 @@ using namespace taut;
 namespace {
 
 template <class P>
-using Method = Ncg<DaiKou, BlockJacobi, SufficientDecrease, DecrementWindow, P>;
+using NcgIn = Ncg<DaiKou, BlockJacobi, SufficientDecrease, DecrementWindow, P>;
 
 }  // namespace
 
@@ -20,10 +20,10 @@ TEMPLATE_TEST_CASE("lower precision reaches what it can resolve", "", Mixed, Fp3
   toy::Chain<toy::Quartic, TestType> chain(chain_params);
   toy::Chain<toy::Quartic> const twin(chain_params);
 
-  typename Method<TestType>::Params params;
+  typename NcgIn<TestType>::Params params;
   params.stop.tolerance = 1e-4;
   auto x = chain.start();
-  auto report = Method<TestType>(params).minimise(chain, x);
+  auto report = NcgIn<TestType>(params).minimise(chain, x);
   CHECK(report.converged());
   CHECK(toy::distance_to_minimum(twin, x) < 3e-4 * chain.scale().length);
 
@@ -31,7 +31,7 @@ TEMPLATE_TEST_CASE("lower precision reaches what it can resolve", "", Mixed, Fp3
   params.stop.tolerance = 1e-12;
   params.budget.max_iterations = 5000;
   x = chain.start();
-  report = Method<TestType>(params).minimise(chain, x);
+  report = NcgIn<TestType>(params).minimise(chain, x);
   CHECK(report.stop == Stop::stalled);
   CHECK(toy::distance_to_minimum(twin, x) < 3e-5 * chain.scale().length);
 }

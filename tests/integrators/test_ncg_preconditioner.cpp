@@ -50,7 +50,7 @@ private:
 };
 
 template <template <class...> class Preconditioner>
-using Method = Ncg<DaiKou, Preconditioner, SufficientDecrease, DecrementWindow, Fp64>;
+using NcgWith = Ncg<DaiKou, Preconditioner, SufficientDecrease, DecrementWindow, Fp64>;
 
 /// V diag(lambda) V' for a random rotation V.
 template <class T>
@@ -133,9 +133,9 @@ TEST_CASE("a preconditioner that is applied from outside gives the same iterates
     toy::Chain<toy::Barrier> chain;
     auto const x = chain.start(), y = chain.start();
     auto const inside =
-        Method<BlockJacobi>({.preconditioner = {.refresh = refresh}}).minimise(chain, x);
+        NcgWith<BlockJacobi>({.preconditioner = {.refresh = refresh}}).minimise(chain, x);
     auto const outside =
-        Method<OwnBlockJacobi>({.preconditioner = {.refresh = refresh}}).minimise(chain, y);
+        NcgWith<OwnBlockJacobi>({.preconditioner = {.refresh = refresh}}).minimise(chain, y);
     CHECK(inside.converged());
     CHECK(inside.iterations == outside.iterations);
     CHECK(inside.refreshes == outside.refreshes);
@@ -147,7 +147,7 @@ TEST_CASE("a preconditioner that is applied from outside gives the same iterates
 TEST_CASE("preconditioners are rebuilt when they are due, without a restart") {
   auto const run = [](Refresh const& refresh) {
     toy::Chain<toy::Quartic> chain;
-    return Method<BlockJacobi>(
+    return NcgWith<BlockJacobi>(
                {.preconditioner = {.refresh = refresh}, .budget = {.max_iterations = 40}})
         .minimise(chain, chain.start());
   };

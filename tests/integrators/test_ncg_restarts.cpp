@@ -13,7 +13,7 @@ using namespace taut;
 namespace {
 
 template <class Beta>
-using Method = Ncg<Beta, BlockJacobi, SufficientDecrease, DecrementWindow, Fp64>;
+using NcgOf = Ncg<Beta, BlockJacobi, SufficientDecrease, DecrementWindow, Fp64>;
 
 /// g'p = +g'P g.
 struct Uphill {
@@ -38,8 +38,8 @@ struct Stubborn : toy::Chain<toy::Anisotropic> {
 };
 
 template <class Beta>
-typename Method<Beta>::Params brief() {
-  typename Method<Beta>::Params params;
+typename NcgOf<Beta>::Params brief() {
+  typename NcgOf<Beta>::Params params;
   params.stop.tolerance = 0;
   params.budget.max_iterations = 9;
   return params;
@@ -49,14 +49,14 @@ typename Method<Beta>::Params brief() {
 
 TEST_CASE("directions that lead uphill are counted") {
   toy::Chain<toy::Anisotropic> chain;
-  auto const report = Method<Uphill>(brief<Uphill>()).minimise(chain, chain.start());
+  auto const report = NcgOf<Uphill>(brief<Uphill>()).minimise(chain, chain.start());
   CHECK(report.restarts.not_descent == 8);  // the first direction has no past
   CHECK(report.restarts.total() == 8);
 }
 
 TEST_CASE("betas that are no numbers are counted") {
   toy::Chain<toy::Anisotropic> chain;
-  auto const report = Method<NotANumber>(brief<NotANumber>()).minimise(chain, chain.start());
+  auto const report = NcgOf<NotANumber>(brief<NotANumber>()).minimise(chain, chain.start());
   CHECK(report.restarts.curvature == 8);
   CHECK(report.restarts.total() == 8);
 }
@@ -66,7 +66,7 @@ TEST_CASE("directions along which nothing decreases are counted") {
   Stubborn chain(2, SufficientDecrease::Params().max_backtracks + 1);
   std::vector<double> betas;
   auto const report =
-      Method<DaiKou>(brief<DaiKou>()).minimise(chain, chain.start(), [&](auto const& step) {
+      NcgOf<DaiKou>(brief<DaiKou>()).minimise(chain, chain.start(), [&](auto const& step) {
         betas.push_back(step.beta);
       });
   CHECK(report.restarts.armijo == 1);
@@ -81,7 +81,7 @@ TEST_CASE("a rebuilt preconditioner does not restart the direction") {
   params.preconditioner.refresh = Refresh::lagged(4);
   params.budget.max_iterations = 12;
   std::vector<double> betas;
-  auto const report = Method<DaiKou>(params).minimise(
+  auto const report = NcgOf<DaiKou>(params).minimise(
       chain, chain.start(), [&](auto const& step) { betas.push_back(step.beta); });
   CHECK(report.refreshes == 3);
   CHECK(report.restarts.total() == 0);

@@ -9,6 +9,7 @@
 #include <algorithm>
 #include <limits>
 
+#include "matrix_rows.hpp"
 #include "samples.hpp"
 #include "support/data.hpp"
 
@@ -17,6 +18,7 @@ namespace {
 using namespace taut;
 using Catch::Matchers::WithinAbs;
 using Catch::Matchers::WithinRel;
+using test::matrix_of;
 using test::with_stretches;
 
 static_assert(ReturnMap<NeverYields> && ReturnMap<VonMises> && ReturnMap<VonMisesFixedCorotated> &&
@@ -96,13 +98,6 @@ int check_map(Map const& map) {
   return yields;
 }
 
-Mat3<double> matrix(nlohmann::json const& rows) {
-  Mat3<double> m;
-  for (int i = 0; i < 3; ++i)
-    for (int j = 0; j < 3; ++j) m(i, j) = rows[i][j].get<double>();
-  return m;
-}
-
 }  // namespace
 
 TEST_CASE("return maps leave alone what is elastic, and mapping twice is mapping once",
@@ -168,9 +163,9 @@ TEST_CASE("the maps of the reference give its numbers", "[return_map]") {
       CAPTURE(v["name"].get<std::string>());
       VonMisesFixedCorotated const map{.mu = v["mu"], .yield_stress = v["yield_stress"]};
       VonMisesFixedCorotated::State<double> state;
-      Returned<double> const r = map.map(matrix(v["F"]), state);
+      Returned<double> const r = map.map(matrix_of(v["F"]), state);
       CHECK(r.yielded == v["yielded"].get<bool>());
-      CHECK(distance(r.F, matrix(v["F_new"])) < 1e-12);
+      CHECK(distance(r.F, matrix_of(v["F_new"])) < 1e-12);
     }
   }
   SECTION("snow") {

@@ -1,5 +1,6 @@
 // The constitutive models against the shared vectors.
 #include "../support/data.hpp"
+#include "matrix_rows.hpp"
 #include "samples.hpp"
 
 #include <catch2/catch_test_macros.hpp>
@@ -11,13 +12,6 @@ using Catch::Matchers::WithinAbs;
 using Catch::Matchers::WithinRel;
 
 namespace {
-
-Mat3<double> matrix(nlohmann::json const& rows) {
-  Mat3<double> m;
-  for (int i = 0; i < 3; ++i)
-    for (int j = 0; j < 3; ++j) m(i, j) = rows[i][j];
-  return m;
-}
 
 Vec3<double> shape(Mat3<double> const& B, int a) {
   if (a > 0) return {B(a - 1, 0), B(a - 1, 1), B(a - 1, 2)};
@@ -55,9 +49,9 @@ void check_close(Mat3<double> const& found, Mat3<double> const& expected) {
 TEST_CASE("rotation, cofactor and twist modes reproduce the shared vectors", "[materials]") {
   for (auto const& c : test::vectors("elastic")) {
     INFO(c["name"]);
-    Mat3<double> const B = matrix(c["B"]), F = matrix(c["F"]), dF = edges(c["p"], B);
+    Mat3<double> const B = matrix_of(c["B"]), F = matrix_of(c["F"]), dF = edges(c["p"], B);
     auto const state = evaluate<Arap>(lame_parameters(c["E"], c["nu"]), F);
-    check_close(state.R, matrix(c["R"]));
+    check_close(state.R, matrix_of(c["R"]));
     check_close(state.C, stacked(c["g3"]));
     check_close(dF, stacked(c["dFdx_p"]));
     CHECK_THAT(state.invariants.I1, WithinRel(double(c["I1"]), 1e-11));
@@ -85,7 +79,7 @@ TEST_CASE("rotation, cofactor and twist modes reproduce the shared vectors", "[m
 TEST_CASE("the six terms reproduce the shared vectors", "[materials]") {
   for (auto const& c : test::vectors("elastic")) {
     INFO(c["name"]);
-    Mat3<double> const B = matrix(c["B"]), F = matrix(c["F"]), dF = edges(c["p"], B);
+    Mat3<double> const B = matrix_of(c["B"]), F = matrix_of(c["F"]), dF = edges(c["p"], B);
     auto const state = evaluate<FixedCorotated>(lame_parameters(c["E"], c["nu"]), F);
     auto const& terms = c["materials"]["FCR"]["diag_h"];
     for (int a = 0; a < 4; ++a) {
@@ -121,7 +115,7 @@ TEST_CASE("the models reproduce the shared vectors", "[materials]") {
   for (auto const& c : test::vectors("elastic")) {
     INFO(c["name"]);
     Lame<double> const m = lame_parameters(c["E"], c["nu"]);
-    Mat3<double> const B = matrix(c["B"]), F = matrix(c["F"]);
+    Mat3<double> const B = matrix_of(c["B"]), F = matrix_of(c["F"]);
     Mat3<double> const dF = edges(c["p"], B);
     auto const check = [&]<class Model>(char const* key) {
       if (!c["materials"].contains(key) || c["materials"][key].is_null()) return;
@@ -182,7 +176,7 @@ TEST_CASE("the projected 9x9 of fixed corotated reproduces the shared vectors", 
   for (auto const& c : cases) {
     INFO(c["name"]);
     Lame<double> const m{c["mu"], c["lam"]};
-    auto const state = evaluate<FixedCorotated>(m, matrix(c["F"]));
+    auto const state = evaluate<FixedCorotated>(m, matrix_of(c["F"]));
     CHECK_THAT((energy<FixedCorotated>(m, state.F)), WithinRel(double(c["psi"]), 1e-11));
     double const size = double(c["frob_projected"]);
     auto const projected = singular_frame<FixedCorotated>(state);

@@ -15,9 +15,9 @@ namespace taut::test {
 using Field = std::vector<Vec3<double>>;
 
 template <class Space>
-using Right = taut::Space<typename Space::execution, Kokkos::LayoutRight>;
+using RightOf = taut::Space<typename Space::execution, Kokkos::LayoutRight>;
 template <class Space>
-using Left = taut::Space<typename Space::execution, Kokkos::LayoutLeft>;
+using LeftOf = taut::Space<typename Space::execution, Kokkos::LayoutLeft>;
 
 /// One combination of policies.
 template <class Model, class Filter, class Kernel_, class Precision_, class Space_, bool packed_>

@@ -11,13 +11,13 @@ namespace {
 TEST_CASE("sweeps over particles are the sums over all nodes: fixed corotated, quadratic",
           "[mpm][particles]") {
   check_sweeps<Combination<FixedCorotated, FullProjection, QuadraticSpline, Fp64,
-                           Right<DefaultSpace>, true>>();
+                           RightOf<DefaultSpace>, true>>();
 }
 
 TEST_CASE("sweeps over particles are the sums over all nodes: stable neo-Hookean, cubic",
           "[mpm][particles]") {
   check_sweeps<
-      Combination<StableNeoHookean, ClampElement, CubicSpline, Fp64, Left<DefaultSpace>, true>>();
+      Combination<StableNeoHookean, ClampElement, CubicSpline, Fp64, LeftOf<DefaultSpace>, true>>();
 }
 
 }  // namespace

@@ -11,16 +11,16 @@ using namespace taut;
 using namespace taut::test;
 
 template <class Embedding_, class S, class T, int radius>
-struct Combination : Case<S, T, radius> {
+struct EmbeddedCase : Case<S, T, radius> {
   using Embedding = Embedding_;
 };
 
 }  // namespace
 
 TEMPLATE_TEST_CASE("the coarse matrix is P'AP", "[galerkin]",
-                   (Combination<LinearEmbedding, Right, double, 2>),
-                   (Combination<LinearEmbedding, Left, float, 3>),
-                   (Combination<QuadraticEmbedding, Right, double, 2>)) {
+                   (EmbeddedCase<LinearEmbedding, Right, double, 2>),
+                   (EmbeddedCase<LinearEmbedding, Left, float, 3>),
+                   (EmbeddedCase<QuadraticEmbedding, Right, double, 2>)) {
   using Embedding = typename TestType::Embedding;
   using S = typename TestType::S;
   using T = typename TestType::Real;

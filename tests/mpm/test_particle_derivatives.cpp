@@ -15,8 +15,9 @@ using Catch::Matchers::WithinRel;
 
 TEMPLATE_TEST_CASE(
     "the assembled Hessian of particles is their product", "[mpm][particles]",
-    (Combination<FixedCorotated, FullProjection, QuadraticSpline, Fp64, Right<DefaultSpace>, true>),
-    (Combination<StableNeoHookean, ClampElement, CubicSpline, Fp64, Left<DefaultSpace>, true>)) {
+    (Combination<FixedCorotated, FullProjection, QuadraticSpline, Fp64, RightOf<DefaultSpace>,
+                 true>),
+    (Combination<StableNeoHookean, ClampElement, CubicSpline, Fp64, LeftOf<DefaultSpace>, true>)) {
   using C = TestType;
   Problem<C> problem(1, 3);
   int const n = problem.scene.nodes();
@@ -43,8 +44,9 @@ TEMPLATE_TEST_CASE(
 
 TEMPLATE_TEST_CASE(
     "value, gradient and product of particles are derivatives of each other", "[mpm][particles]",
-    (Combination<FixedCorotated, FullProjection, QuadraticSpline, Fp64, Right<DefaultSpace>, true>),
-    (Combination<StableNeoHookean, ClampElement, CubicSpline, Fp64, Left<DefaultSpace>, true>)) {
+    (Combination<FixedCorotated, FullProjection, QuadraticSpline, Fp64, RightOf<DefaultSpace>,
+                 true>),
+    (Combination<StableNeoHookean, ClampElement, CubicSpline, Fp64, LeftOf<DefaultSpace>, true>)) {
   using C = TestType;
   Problem<C> problem(1, 3);
   int const n = problem.scene.nodes();
@@ -83,7 +85,7 @@ TEMPLATE_TEST_CASE(
 
 TEST_CASE("a step bound of particles keeps them from inverting", "[mpm][particles]") {
   using C =
-      Combination<NeoHookean, ClampElement, QuadraticSpline, Mixed, Right<DefaultSpace>, true>;
+      Combination<NeoHookean, ClampElement, QuadraticSpline, Mixed, RightOf<DefaultSpace>, true>;
   Problem<C> problem;
   auto const& term = problem.term;
   int const n = problem.scene.nodes();
@@ -119,8 +121,8 @@ TEST_CASE("a step bound of particles keeps them from inverting", "[mpm][particle
   CHECK(smallest_J(certified) > 0);
   CHECK(smallest_J(-certified) > 0);
   // A material that tolerates inversion asks for nothing; prescribed motion still may not fold.
-  Problem<
-      Combination<FixedCorotated, ClampElement, QuadraticSpline, Mixed, Right<DefaultSpace>, true>>
+  Problem<Combination<FixedCorotated, ClampElement, QuadraticSpline, Mixed, RightOf<DefaultSpace>,
+                      true>>
       tolerant;
   CHECK(tolerant.term.max_step(tolerant.x, p, inf) == inf);
   CHECK(tolerant.term.max_prescribed_step(tolerant.x, p, inf) == bound);

@@ -121,15 +121,16 @@ void check(double round_off, int team = 0) {
 }
 
 TEST_CASE("particles make their operator, its matrix and the coarser one", "[mpm][operator]") {
-  check<Of<Fp64, test::Right<DefaultSpace>, true>>(1e-13);
+  check<Of<Fp64, test::RightOf<DefaultSpace>, true>>(1e-13);
 }
 TEST_CASE("the same in float, by threads of a particle each, in a device's layout",
           "[mpm][operator]") {
-  check<Of<Mixed, test::Left<DefaultSpace>, false>>(1e-5, test::team_sizes<DefaultSpace>().back());
+  check<Of<Mixed, test::LeftOf<DefaultSpace>, false>>(1e-5,
+                                                      test::team_sizes<DefaultSpace>().back());
 }
 
 TEST_CASE("a cycle without a fine matrix is that of the matrix", "[mpm][operator]") {
-  using C = Of<Fp64, test::Right<DefaultSpace>, true>;
+  using C = Of<Fp64, test::RightOf<DefaultSpace>, true>;
   using S = C::Space;
   Linearised<C> const l;
   auto const level = l.matrix();
@@ -154,7 +155,7 @@ TEST_CASE("a cycle without a fine matrix is that of the matrix", "[mpm][operator
 
 TEST_CASE("the polynomial that smooths is positive where two grains are stiffer than all else",
           "[mpm][operator]") {
-  using C = Of<Fp64, test::Right<DefaultSpace>, true>;
+  using C = Of<Fp64, test::RightOf<DefaultSpace>, true>;
   using S = C::Space;
   double const dx = 0.05, step = 1.0 / 24;
   auto list = test::jittered_block(6, 2, dx, {-3.3, 5.2, 6.6}, 1, 0.0);
@@ -205,7 +206,7 @@ TEST_CASE("the polynomial that smooths is positive where two grains are stiffer 
 }
 
 TEST_CASE("cut cells are solved with by patches", "[mpm][operator]") {
-  using C = Of<Fp64, test::Right<DefaultSpace>, true>;
+  using C = Of<Fp64, test::RightOf<DefaultSpace>, true>;
   using S = C::Space;
   Linearised<C> const l;
   auto const matrix = l.matrix();
@@ -282,7 +283,7 @@ TEST_CASE("cut cells are solved with by patches", "[mpm][operator]") {
 }
 
 TEST_CASE("matrices of particles do not depend on the number of threads", "[mpm][operator]") {
-  using C = Of<Fp64, test::Right<DefaultSpace>, true>;
+  using C = Of<Fp64, test::RightOf<DefaultSpace>, true>;
   auto const numbers = [] {
     Linearised<C> const l;
     auto const level = l.matrix();

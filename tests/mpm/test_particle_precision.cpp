@@ -12,12 +12,12 @@ namespace {
 TEST_CASE("sweeps over particles in mixed precision are the sums over all nodes",
           "[mpm][particles]") {
   check_sweeps<
-      Combination<NeoHookean, ClampElement, QuadraticSpline, Mixed, Right<DefaultSpace>, true>>();
+      Combination<NeoHookean, ClampElement, QuadraticSpline, Mixed, RightOf<DefaultSpace>, true>>();
 }
 
 TEST_CASE("teams of threads with a particle each sum over all nodes", "[mpm][particles]") {
   check_sweeps<Combination<FixedCorotated, FullProjection, QuadraticSpline, Mixed,
-                           Left<DefaultSpace>, false>>();
+                           LeftOf<DefaultSpace>, false>>();
 }
 
 }  // namespace

@@ -23,7 +23,7 @@ using S = DefaultSpace;
 template <class T>
 using View = Kokkos::View<T*, S::memory>;
 
-constexpr int counts[] = {0, 1, 511, 512, 513, 4096, 4097, 100'000};
+constexpr int lengths[] = {0, 1, 511, 512, 513, 4096, 4097, 100'000};
 
 template <class T>
 View<T> to_device(std::vector<T> const& from) {
@@ -72,7 +72,7 @@ std::vector<Key> keys(int n, int kind) {
 }  // namespace
 
 TEST_CASE("an exclusive scan says where each part begins", "[exec]") {
-  for (int n : counts) {
+  for (int n : lengths) {
     std::vector<int> lengths(n), expected(n);
     std::mt19937 random(n);
     for (int& length : lengths) length = static_cast<int>(random() % 10);
@@ -98,7 +98,7 @@ TEST_CASE("an exclusive scan says where each part begins", "[exec]") {
 TEMPLATE_TEST_CASE("sorts are stable", "[exec]", std::uint32_t, std::uint64_t) {
   using Key = TestType;
   StableSort<S, Key> const sorter(100'000);
-  for (int n : counts) {
+  for (int n : lengths) {
     for (int kind = 0; kind < 5; ++kind) {
       std::vector<Key> const given = keys<Key>(n, kind);
       std::vector<int> expected(n);
@@ -134,7 +134,7 @@ TEST_CASE("a sort takes the first keys of a longer array, and not more than its 
 
 TEST_CASE("buckets hold their items in ascending order", "[exec]") {
   BucketSort<S> const sorter(100'000);
-  for (int n : counts) {
+  for (int n : lengths) {
     for (int buckets : {1, 2, 300, 70'000}) {
       // The first and the last buckets stay empty where there are enough.
       std::mt19937 random(n + buckets);

@@ -11,7 +11,7 @@ using namespace taut::test;
 
 namespace {
 
-Checkpoint sample() {
+Checkpoint sample_checkpoint() {
   Checkpoint state;
   const double nan = std::bit_cast<double>(0x7ff8000000abcdefULL);  // a NaN with a payload
   state.set("positions", std::vector<double>{0.1, -0.0, 1e-320, nan, 1e300});
@@ -34,7 +34,7 @@ std::string bytes(std::vector<T> const& values) {
 TEST_CASE("a checkpoint is read back bitwise") {
   const Folder folder;
   const auto path = folder / "new/checkpoint.h5";
-  const Checkpoint written = sample();
+  const Checkpoint written = sample_checkpoint();
   write_checkpoint(path, written, "scene");
   write_checkpoint(path, written, "scene");  // replaces
   const Checkpoint read = read_checkpoint(path, "scene");
@@ -48,7 +48,7 @@ TEST_CASE("a checkpoint is read back bitwise") {
 }
 
 TEST_CASE("asking a checkpoint for what it lacks is an error") {
-  const Checkpoint state = sample();
+  const Checkpoint state = sample_checkpoint();
   check_says(sentence([&] { state.get<double>("momentum"); }), {"'momentum'"});
   check_says(sentence([&] { state.get<float>("positions"); }), {"'positions'", "precision"});
   check_says(sentence([&] { state.number<double>("positions"); }), {"not one number"});
@@ -61,7 +61,7 @@ TEST_CASE("a missing, foreign, changed or damaged checkpoint is refused with a s
   write_file_atomically(path, "text");
   check_says(sentence([&] { read_checkpoint(path, ""); }), {path.string(), "no checkpoint"});
 
-  write_checkpoint(path, sample(), "scene");
+  write_checkpoint(path, sample_checkpoint(), "scene");
   check_says(sentence([&] { read_checkpoint(path, "scene "); }),
              {path.string(), "scene", "changed"});
 

@@ -24,7 +24,7 @@ namespace {
 
 constexpr std::size_t n_points = 300;
 
-ResultMesh sample() {
+ResultMesh sample_mesh() {
   ResultMesh mesh;
   mesh.mesh.points.resize(n_points);
   for (std::int32_t i = 0; i + 3 < std::int32_t(n_points); ++i) {
@@ -128,7 +128,8 @@ TEST_CASE("a run killed at any moment leaves every finished frame") {
     // Half of the runs outgrow their layout again and again, so that copies are interrupted too.
     const std::int64_t capacity = round % 2 == 0 ? 3000 : 2;
     const Child run([&](int pipe) {
-      auto writer = ResultWriter::create(path, sample(), capacity, ResultWriter::IfExists::refuse);
+      auto writer =
+          ResultWriter::create(path, sample_mesh(), capacity, ResultWriter::IfExists::refuse);
       for (std::int64_t k = 0; k < 3000; ++k) {
         say(pipe, ".");  // k frames are finished
         append(writer, k);
@@ -149,7 +150,7 @@ TEST_CASE("a run killed at any moment leaves every finished frame") {
     CHECK(file >= 0);
     H5Fclose(file);
     {
-      auto writer = ResultWriter::resume(path, sample(), found, capacity);
+      auto writer = ResultWriter::resume(path, sample_mesh(), found, capacity);
       append(writer, found);
     }
     CHECK(checked_frames(path) == found + 1);
@@ -163,7 +164,7 @@ TEST_CASE("a full disk is an error of the frame that did not fit") {
   const auto path = folder / "result.vtkhdf";
   const Child run([&](int pipe) {
     {
-      auto writer = ResultWriter::create(path, sample(), 100, ResultWriter::IfExists::refuse);
+      auto writer = ResultWriter::create(path, sample_mesh(), 100, ResultWriter::IfExists::refuse);
       for (std::int64_t k = 0; k < 3; ++k) append(writer, k);
     }
     const hid_t file = H5Fopen(path.c_str(), H5F_ACC_RDONLY, H5P_DEFAULT);
@@ -171,7 +172,7 @@ TEST_CASE("a full disk is an error of the frame that did not fit") {
     const haddr_t start = H5Dget_offset(velocity);
     H5Dclose(velocity);
     H5Fclose(file);
-    auto writer = ResultWriter::resume(path, sample(), 3, 100);
+    auto writer = ResultWriter::resume(path, sample_mesh(), 3, 100);
     // Half of the fourth frame's velocities fit.
     limit_file_size(start + n_points * sizeof(Point) * 7 / 2);
     say(pipe, outcome([&] { append(writer, 3); }));
@@ -182,7 +183,7 @@ TEST_CASE("a full disk is an error of the frame that did not fit") {
   check_says(
       said, {path.string(), "frame 3 cannot be written", "the velocities", "File too large", "|3"});
   CHECK(checked_frames(path) == 3);
-  auto writer = ResultWriter::resume(path, sample(), 3, 100);
+  auto writer = ResultWriter::resume(path, sample_mesh(), 3, 100);
   append(writer, 3);
   CHECK(checked_frames(path) == 4);
 }
@@ -191,14 +192,14 @@ TEST_CASE("a result that cannot be begun leaves nothing, and an older one untouc
   const Folder folder;
   const auto path = folder / "result.vtkhdf";
   {
-    auto writer = ResultWriter::create(path, sample(), 5, ResultWriter::IfExists::refuse);
+    auto writer = ResultWriter::create(path, sample_mesh(), 5, ResultWriter::IfExists::refuse);
     append(writer, 0);
   }
   for (char const* const name : {"new.vtkhdf", "result.vtkhdf"}) {
     const Child run([&](int pipe) {
       limit_file_size(6000);
       say(pipe, outcome([&] {
-            ResultWriter::create(folder / name, sample(), 5, ResultWriter::IfExists::replace);
+            ResultWriter::create(folder / name, sample_mesh(), 5, ResultWriter::IfExists::replace);
           }));
     });
     const std::string said = run.said();

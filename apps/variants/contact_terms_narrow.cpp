@@ -6,4 +6,8 @@ template std::shared_ptr<ProgramContact<Mixed> const> add_contact_term(AnySteppe
                                                                        ContactPart<Mixed> const&,
                                                                        ContactOptions const&);
 
+template std::shared_ptr<ProgramContact<Fp32> const> add_contact_term(AnySteppedTerms<Fp32>&,
+                                                                      ContactPart<Fp32> const&,
+                                                                      ContactOptions const&);
+
 }  // namespace taut

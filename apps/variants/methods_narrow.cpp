@@ -3,5 +3,6 @@
 namespace taut {
 
 template class AnyMinimiser<Mixed>;
+template class AnyMinimiser<Fp32>;
 
 }  // namespace taut

@@ -2,6 +2,11 @@
 
 namespace taut {
 
+template std::shared_ptr<ProgramObstacle<Mixed> const> add_obstacle_term(AnySteppedTerms<Mixed>&,
+                                                                         ContactPart<Mixed> const&,
+                                                                         ContactOptions const&,
+                                                                         SceneObstacle const&);
+
 template std::shared_ptr<ProgramObstacle<Fp32> const> add_obstacle_term(AnySteppedTerms<Fp32>&,
                                                                         ContactPart<Fp32> const&,
                                                                         ContactOptions const&,

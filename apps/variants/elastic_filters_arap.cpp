@@ -1,7 +1,0 @@
-#include <taut/apps/variants/elastic_filters.hpp>
-
-namespace taut {
-
-static bool const filled = add_filtered_term<Arap>.fill(add_filtered<Arap>);
-
-}  // namespace taut

@@ -1,7 +1,0 @@
-#include <taut/apps/program/methods_impl.hpp>
-
-namespace taut {
-
-template class AnyMinimiser<Fp32>;
-
-}  // namespace taut
