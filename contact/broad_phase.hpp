@@ -118,38 +118,50 @@ KOKKOS_FUNCTION void vertices_of(SurfaceViews<S> const& surface, int first, int 
 
 /// Of what pairs are made: `accept(asker(i), j)` says whether box i of those that ask and box j of
 /// those that are asked for make one; then `order(i, j, ij)` are its primitives in their order.
+/// These are what all that are made of points and triangles share, and all that are made of edges.
 template <class S>
-struct PairPointTriangle {
+struct PointTrianglePairs {
   static constexpr PairKind kind = PairKind::point_triangle;
   SurfaceViews<S> surface;
   Held<S> held;
 
-  struct Asker {
-    int vertex;
-  };
-  KOKKOS_FUNCTION Asker asker(int i) const { return {surface.vertex(i)}; }
   KOKKOS_FUNCTION SizeClass least(int) const { return smallest_class; }
-  KOKKOS_FUNCTION void order(int i, int j, int (&ij)[2]) const { ij[0] = i, ij[1] = j; }
-  KOKKOS_FUNCTION bool accept(Asker const& i, int j) const {
-    int const v[4] = {i.vertex, surface.triangle(3 * j), surface.triangle(3 * j + 1),
-                      surface.triangle(3 * j + 2)};
+  /// Whether a point and a triangle share no vertex and are not held.
+  KOKKOS_FUNCTION bool pair(int const (&v)[4]) const {
     return v[0] != v[1] && v[0] != v[2] && v[0] != v[3] && !held(v);
   }
 };
-
-/// Whether two edges share no vertex and are not held.
 template <class S>
-KOKKOS_FUNCTION bool edges_pair(SurfaceViews<S> const& surface, Held<S> const& held,
-                                int const (&i)[2], int j) {
-  int const v[4] = {i[0], i[1], surface.edge(2 * j), surface.edge(2 * j + 1)};
-  return v[0] != v[2] && v[0] != v[3] && v[1] != v[2] && v[1] != v[3] && !held(v);
-}
-
-template <class S>
-struct PairEdgeEdge {
+struct EdgePairs {
   static constexpr PairKind kind = PairKind::edge_edge;
   SurfaceViews<S> surface;
   Held<S> held;
+
+  KOKKOS_FUNCTION void order(int i, int j, int (&ij)[2]) const {
+    ij[0] = Kokkos::min(i, j), ij[1] = Kokkos::max(i, j);
+  }
+  /// Whether an edge with these ends and edge j share no vertex and are not held.
+  KOKKOS_FUNCTION bool pair(int const (&end)[2], int j) const {
+    int const v[4] = {end[0], end[1], surface.edge(2 * j), surface.edge(2 * j + 1)};
+    return v[0] != v[2] && v[0] != v[3] && v[1] != v[2] && v[1] != v[3] && !held(v);
+  }
+};
+
+template <class S>
+struct PairPointTriangle : PointTrianglePairs<S> {
+  struct Asker {
+    int vertex;
+  };
+  KOKKOS_FUNCTION Asker asker(int i) const { return {this->surface.vertex(i)}; }
+  KOKKOS_FUNCTION void order(int i, int j, int (&ij)[2]) const { ij[0] = i, ij[1] = j; }
+  KOKKOS_FUNCTION bool accept(Asker const& i, int j) const {
+    auto const& triangle = this->surface.triangle;
+    return this->pair({i.vertex, triangle(3 * j), triangle(3 * j + 1), triangle(3 * j + 2)});
+  }
+};
+
+template <class S>
+struct PairEdgeEdge : EdgePairs<S> {
   Kokkos::View<SearchBox const*, typename S::memory> box;
 
   struct Asker {
@@ -157,14 +169,11 @@ struct PairEdgeEdge {
     SizeClass least;
   };
   KOKKOS_FUNCTION Asker asker(int i) const {
-    return {i, {surface.edge(2 * i), surface.edge(2 * i + 1)}, least(i)};
+    return {i, {this->surface.edge(2 * i), this->surface.edge(2 * i + 1)}, least(i)};
   }
   KOKKOS_FUNCTION SizeClass least(int i) const { return size_class(longest_side(box(i))); }
-  KOKKOS_FUNCTION void order(int i, int j, int (&ij)[2]) const {
-    ij[0] = Kokkos::min(i, j), ij[1] = Kokkos::max(i, j);
-  }
   KOKKOS_FUNCTION bool accept(Asker const& i, int j) const {
-    if (!edges_pair(surface, held, i.vertex, j)) return false;
+    if (!this->pair(i.vertex, j)) return false;
     SizeClass const class_j = least(j);
     return i.least != class_j ? i.least < class_j : i.index < j;
   }
@@ -370,10 +379,10 @@ public:
     edges_.build(boxes_.edges());
     SurfaceViews<Space> const& surface = boxes_.surface();
     kernels::Held<Space> const held{motion.fixed, motion.between_fixed};
-    ask(boxes_.points(), triangles_.index(), kernels::PairPointTriangle<Space>{surface, held},
+    ask(boxes_.points(), triangles_.index(), kernels::PairPointTriangle<Space>{{surface, held}},
         found.point_triangle);
     ask(boxes_.edges(), edges_.index(),
-        kernels::PairEdgeEdge<Space>{surface, held, boxes_.edges().box}, found.edge_edge);
+        kernels::PairEdgeEdge<Space>{{surface, held}, boxes_.edges().box}, found.edge_edge);
   }
 
   SurfaceViews<Space> const& surface() const { return boxes_.surface(); }

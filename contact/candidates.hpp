@@ -70,6 +70,11 @@ struct NoteFields {
   Array<float, S> distance;
   Array<double, S> activation;
 
+  /// For `count` pairs; what was noted is lost where that takes other memory.
+  void make_room(int count) {
+    grow(distance, "candidate_distance", count);
+    grow(activation, "candidate_activation", count);
+  }
   KOKKOS_FUNCTION PairNote read(int k) const { return {distance(k), activation(k)}; }
   KOKKOS_FUNCTION void write(int k, PairNote const& note) const {
     distance(k) = note.distance;
@@ -178,6 +183,15 @@ struct MovePairs {
 
 }  // namespace kernels
 
+/// Throws Error if `count` pairs are more than `most`.
+inline void refuse_pairs_beyond(std::int64_t most, std::int64_t count) {
+  if (count <= most) return;
+  throw Error(
+      "contact: {} candidate pairs are more than a list can hold: search within a smaller radius, "
+      "or look for a vertex that has flown off",
+      count);
+}
+
 /// A list of pairs of one kind.
 template <PairKind kind, class S>
 class CandidateList {
@@ -192,12 +206,7 @@ public:
   /// Makes room for `count` pairs and takes them for the list; what was in it is lost. Throws Error
   /// if there are more than an int can count.
   void resize(std::int64_t count) {
-    if (count > std::numeric_limits<int>::max()) {
-      throw Error(
-          "contact: {} candidate pairs are more than a list can hold: search within a smaller "
-          "radius, or look for a vertex that has flown off",
-          count);
-    }
+    refuse_pairs_beyond(std::numeric_limits<int>::max(), count);
     grow(ids_, "candidates", static_cast<std::size_t>(count));
     count_ = static_cast<int>(count);
   }
@@ -214,7 +223,7 @@ public:
   void take(Source const& from, int count, Filter const& filter, Positions const& x) {
     constexpr bool notes = kernels::NotingFilter<Filter>;
     grow(place_, "candidate_place", count);
-    if constexpr (notes) grow_notes(judged_, count);
+    if constexpr (notes) judged_.make_room(count);
     kernels::JudgePairs<kind, S, Source, Positions, Filter> const judge{from,  x,      filter,
                                                                         count, place_, judged_};
     for_each<S>("candidates_judge", judge.packs(), judge);
@@ -222,7 +231,7 @@ public:
     int const kept = exclusive_scan<S, int>("candidates_place", place);
     grow(ids_, "candidates", kept);
     if constexpr (notes) {
-      grow_notes(notes_, kept);
+      notes_.make_room(kept);
     } else {
       notes_ = {};
     }
@@ -232,11 +241,6 @@ public:
   }
 
 private:
-  static void grow_notes(kernels::NoteFields<S>& notes, int count) {
-    grow(notes.distance, "candidate_distance", count);
-    grow(notes.activation, "candidate_activation", count);
-  }
-
   PairIds<S> ids_, spare_;
   kernels::NoteFields<S> notes_, judged_;
   Kokkos::View<int*, typename S::memory> place_;

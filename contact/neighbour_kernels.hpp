@@ -338,46 +338,37 @@ struct ListChosen {
 
 /// Of triangles and the points that they ask for: those that do not ask themselves.
 template <class S>
-struct PairTrianglePoint {
-  static constexpr PairKind kind = PairKind::point_triangle;
-  SurfaceViews<S> surface;
-  Held<S> held;
+struct PairTrianglePoint : PointTrianglePairs<S> {
   HasStray<S, 1> asks;
 
   struct Asker {
     int vertex[3];
   };
   KOKKOS_FUNCTION Asker asker(int i) const {
-    return {{surface.triangle(3 * i), surface.triangle(3 * i + 1), surface.triangle(3 * i + 2)}};
+    auto const& triangle = this->surface.triangle;
+    return {{triangle(3 * i), triangle(3 * i + 1), triangle(3 * i + 2)}};
   }
-  KOKKOS_FUNCTION SizeClass least(int) const { return smallest_class; }
   KOKKOS_FUNCTION void order(int i, int j, int (&ij)[2]) const { ij[0] = j, ij[1] = i; }
   KOKKOS_FUNCTION bool accept(Asker const& i, int j) const {
-    int const v[4] = {surface.vertex(j), i.vertex[0], i.vertex[1], i.vertex[2]};
-    return v[0] != v[1] && v[0] != v[2] && v[0] != v[3] && asks(j) == 0 && !held(v);
+    return asks(j) == 0 &&
+           this->pair({this->surface.vertex(j), i.vertex[0], i.vertex[1], i.vertex[2]});
   }
 };
 
 /// Of edges and all others; of two that ask, the first.
 template <class S>
-struct PairEdgeAnew {
-  static constexpr PairKind kind = PairKind::edge_edge;
-  SurfaceViews<S> surface;
-  Held<S> held;
+struct PairEdgeAnew : EdgePairs<S> {
   HasStray<S, 2> asks;
 
   struct Asker {
     int index, vertex[2];
   };
   KOKKOS_FUNCTION Asker asker(int i) const {
-    return {i, {surface.edge(2 * i), surface.edge(2 * i + 1)}};
+    return {i, {this->surface.edge(2 * i), this->surface.edge(2 * i + 1)}};
   }
   KOKKOS_FUNCTION SizeClass least(int) const { return smallest_class; }
-  KOKKOS_FUNCTION void order(int i, int j, int (&ij)[2]) const {
-    ij[0] = Kokkos::min(i, j), ij[1] = Kokkos::max(i, j);
-  }
   KOKKOS_FUNCTION bool accept(Asker const& i, int j) const {
-    return (i.index < j || asks(j) == 0) && edges_pair(surface, held, i.vertex, j);
+    return (i.index < j || asks(j) == 0) && this->pair(i.vertex, j);
   }
 };
 
@@ -435,16 +426,6 @@ struct MovePrimitives {
     if (next == place(k)) return;
     for (int a = 0; a < 2; ++a) to(first + place(k), a) = from(k, a);
     notes_to.write(first + place(k), notes_from.read(k));
-  }
-};
-
-template <class S>
-struct CopyPrimitives {
-  PrimitivePairs<S> from, to;
-  NoteFields<S> notes_from, notes_to;
-  KOKKOS_FUNCTION void operator()(int k) const {
-    for (int a = 0; a < 2; ++a) to(k, a) = from(k, a);
-    notes_to.write(k, notes_from.read(k));
   }
 };
 

@@ -42,12 +42,7 @@ public:
   }
   /// Makes room for `n` pairs that are to be judged.
   kernels::WritePrimitives<S> room(std::int64_t n) {
-    if (n > std::numeric_limits<int>::max() / 2 - count_) {
-      throw Error(
-          "contact: {} candidate pairs are more than a list can hold: search within a smaller "
-          "radius, or look for a vertex that has flown off",
-          n + count_);
-    }
+    refuse_pairs_beyond(std::numeric_limits<int>::max() / 2, n + count_);
     grow(found_, "neighbours_found", static_cast<std::size_t>(n));
     return {found_};
   }
@@ -56,7 +51,7 @@ public:
   void append(int n, SurfaceViews<S> const& surface, Filter const& filter, Positions const& x) {
     using Source = kernels::FoundPrimitives<kind, S>;
     grow(place_, "neighbour_place", n);
-    grow_notes(judged_, n);
+    judged_.make_room(n);
     kernels::JudgePairs<kind, S, Source, Positions, Filter> const judge{
         {surface, found_}, x, filter, n, place_, judged_};
     for_each<S>("neighbours_judge", judge.packs(), judge);
@@ -64,10 +59,6 @@ public:
   }
 
 private:
-  static void grow_notes(kernels::NoteFields<S>& notes, int count) {
-    grow(notes.distance, "neighbour_distance", count);
-    grow(notes.activation, "neighbour_activation", count);
-  }
   /// Leaves the first pairs of the list, and after them those of `from` that are marked in place_.
   void compact(PrimitivePairs<S> const& from, kernels::NoteFields<S> const& notes, int first,
                int count) {
@@ -78,9 +69,10 @@ private:
     kernels::NoteFields<S> notes_to = in_place ? notes_ : spare_notes_;
     if (!in_place) {
       grow(to, "neighbours", first + kept);
-      grow_notes(notes_to, first + kept);
-      for_each<S>("neighbours_copy", first,
-                  kernels::CopyPrimitives<S>{pairs_, to, notes_, notes_to});
+      notes_to.make_room(first + kept);
+      copy_front<S>(pairs_, to, first);
+      copy_front<S>(notes_.distance, notes_to.distance, first);
+      copy_front<S>(notes_.activation, notes_to.activation, first);
     }
     for_each<S>("neighbours_move", count,
                 kernels::MovePrimitives<S>{from, to, notes, notes_to, place, first, count, kept});
@@ -249,9 +241,9 @@ private:
     point_triangle_.clear();
     edge_edge_.clear();
     ask(near, {boxes_.points().box, boxes_.points().count}, triangles_.index(),
-        kernels::PairPointTriangle<Space>{surface(), held});
+        kernels::PairPointTriangle<Space>{{surface(), held}});
     ask(near, {boxes_.edges().box, boxes_.edges().count}, edges_.index(),
-        kernels::PairEdgeEdge<Space>{surface(), held, boxes_.edges().box});
+        kernels::PairEdgeEdge<Space>{{surface(), held}, boxes_.edges().box});
   }
 
   void search_strays(kernels::WithinReach<Precision, Space> const& near) {
@@ -264,11 +256,11 @@ private:
     kernels::HasStray<Space, 2> const edge{surface().edge, stray_};
     kernels::HasStray<Space, 3> const triangle{surface().triangle, stray_};
     ask(near, askers(boxes_.points(), point), triangles_.index(),
-        kernels::PairPointTriangle<Space>{surface(), held});
+        kernels::PairPointTriangle<Space>{{surface(), held}});
     ask(near, askers(boxes_.triangles(), triangle), points_.index(),
-        kernels::PairTrianglePoint<Space>{surface(), held, point});
+        kernels::PairTrianglePoint<Space>{{surface(), held}, point});
     ask(near, askers(boxes_.edges(), edge), edges_.index(),
-        kernels::PairEdgeAnew<Space>{surface(), held, edge});
+        kernels::PairEdgeAnew<Space>{{surface(), held}, edge});
   }
   template <class Chosen>
   kernels::Askers<Space> askers(BoxSet<Space> const& boxes, Chosen const& chosen) const {

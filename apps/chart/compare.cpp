@@ -3,7 +3,6 @@
 #include <taut/core/report/error.hpp>
 
 #include <algorithm>
-#include <array>
 
 namespace taut {
 namespace {
@@ -52,9 +51,8 @@ private:
   }
   /// A method that does so many iterations and no more, whatever it was told.
   Scene limited(std::filesystem::path const& file, std::size_t method, int iterations) const {
-    std::array const limit{fmt::format("solver.max_iterations={}", iterations)};
     ChartMethod own = methods_[method];
-    own.overrides.insert(own.overrides.end(), limit.begin(), limit.end());
+    own.overrides.push_back(fmt::format("solver.max_iterations={}", iterations));
     return contestants(file, options_.scene.changes, {own}, iterations).front().scene;
   }
 
