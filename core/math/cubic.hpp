@@ -25,7 +25,13 @@ KOKKOS_INLINE_FUNCTION double smallest_positive_root(double a, double b, double 
     stationary[0] = Kokkos::min(r0, r1);
     stationary[1] = Kokkos::max(r0, r1);
   }
-  double low = 0, high = infinity;
+  // No term takes more than its share, 1/2 + 1/4 + 1/8, of a before `low`. What is left is searched
+  // by magnitude first: coefficients that are round-off put stationary points anywhere up to 1e300.
+  double const reach =
+      Kokkos::max(Kokkos::abs(b) / a,
+                  Kokkos::max(Kokkos::sqrt(Kokkos::abs(c) / a), Kokkos::cbrt(Kokkos::abs(d) / a)));
+  double low = reach > 0 ? 0.5 / reach : infinity, high = infinity;
+  if (!(low < infinity)) return infinity;
   for (double s : stationary) {
     if (!(s > low) || !(s < infinity)) continue;
     if (f(s) <= 0) {
@@ -44,6 +50,10 @@ KOKKOS_INLINE_FUNCTION double smallest_positive_root(double a, double b, double 
       high *= 2;
       if (!(high < DBL_MAX / 2)) return infinity;
     }
+  }
+  while (low > 0 && high > 4 * low) {
+    double const middle = Kokkos::sqrt(low) * Kokkos::sqrt(high);
+    (f(middle) > 0 ? low : high) = middle;
   }
   // Newton steps inside a shrinking bracket [f > 0, f <= 0]; bisection where Newton leaves it.
   for (int k = 0; k < 100 && high - low > 4 * DBL_EPSILON * high; ++k) {

@@ -39,3 +39,31 @@ TEST_CASE("where a cubic first vanishes", "[math]") {
     CHECK_THAT(found, WithinRel(expected, 1e-6));
   }
 }
+
+TEST_CASE("a root is found whatever round-off has left in the other coefficients", "[math]") {
+  // A body that moves along one axis has volumes linear in the step, but for coefficients of any
+  // small size, whose stationary points and other roots are anywhere up to 1e60.
+  CHECK_THAT(smallest_positive_root(2.1e-6, -0.21, 7e-47, 3e-59), WithinRel(1e-5, 1e-14));
+  std::mt19937_64 rng(7);
+  std::uniform_real_distribution<double> uniform(-1, 1);
+  auto const size = [&](double smallest) {
+    return std::pow(10.0, smallest * (0.5 + 0.5 * uniform(rng)));
+  };
+  int finite = 0;
+  for (int k = 0; k < 100000; ++k) {
+    double const a = size(-10), b = size(-15) * uniform(rng), c = size(-60) * uniform(rng),
+                 d = size(-60) * uniform(rng);
+    long double const t = smallest_positive_root(a, b, c, d);
+    if (t == std::numeric_limits<double>::infinity()) {
+      CHECK((b >= 0 || c > 0 || d > 0));
+      continue;
+    }
+    ++finite;
+    auto const value = [&](long double s) { return a + s * (b + s * (c + s * d)); };
+    long double const terms = a + t * (std::abs(b) + t * (std::abs(c) + t * std::abs(d)));
+    if (!(value(t) > -1e-15L * terms && value(t * (1 + 1e-12L)) < 1e-11L * terms)) {
+      FAIL(a << ' ' << b << ' ' << c << ' ' << d << ": " << t);
+    }
+  }
+  CHECK(finite > 50000);
+}
