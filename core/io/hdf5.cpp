@@ -75,8 +75,8 @@ Handle open_file(std::filesystem::path const& path, unsigned flags) {
 }
 
 Handle create_file(std::filesystem::path const& path) {
-  const Handle list = access_list();
-  return {H5Fcreate(path.c_str(), H5F_ACC_TRUNC, H5P_DEFAULT, list), H5Fclose,
+  const Handle list = access_list(), creation = creation_list(H5P_FILE_CREATE);
+  return {H5Fcreate(path.c_str(), H5F_ACC_TRUNC, creation, list), H5Fclose,
           path.string() + ": cannot be created"};
 }
 

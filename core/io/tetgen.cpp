@@ -110,6 +110,13 @@ TetMesh read_tet_mesh(std::filesystem::path const& path) {
   namespace fs = std::filesystem;
   const std::string extension = path.extension().string();
   if (extension == ".msh") return parse_gmsh(read_file(path), path.string());
+  if (extension == ".obj") {
+    throw Error(
+        "{}: an OBJ file holds a surface, and tets are needed here; fill it by a mesh generator "
+        "and "
+        "give its .msh, or its .node and .ele.",
+        path.string());
+  }
 
   const bool named_file = extension == ".node" || extension == ".ele";
   const fs::path stem = named_file ? fs::path(path).replace_extension() : path;

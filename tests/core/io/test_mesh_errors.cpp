@@ -43,6 +43,7 @@ TEST_CASE("a missing or wrong file is named with the path it was looked for unde
   check_says(sentence([&] { read_obj(folder.path()); }), {"folder"});
   write_file_atomically(folder / "half.node", four);
   check_says(sentence([&] { read_tet_mesh(folder / "half"); }), {"half.ele", "no such file"});
+  check_says(sentence([&] { read_tet_mesh("body.obj"); }), {"body.obj", "surface", "tets"});
 }
 
 TEST_CASE("gmsh: what is wrong is named with its line") {

@@ -258,6 +258,13 @@ TEST_CASE("equal runs leave equal files") {
     append_frames(writer, 0, 4);
   }
   CHECK(read_file(folder / "a.vtkhdf") == read_file(folder / "b.vtkhdf"));
+  // Also where they are not of the same second: nothing is stamped, the root group neither.
+  const hid_t file = H5Fopen((folder / "a.vtkhdf").c_str(), H5F_ACC_RDONLY, H5P_DEFAULT);
+  H5O_info_t info;
+  REQUIRE(H5Oget_info(file, &info) >= 0);
+  H5Fclose(file);
+  CHECK(info.ctime == 0);
+  CHECK(info.mtime == 0);
 }
 
 TEST_CASE("the layout is VTKHDF's: unstructured grid, static topology, steps") {
