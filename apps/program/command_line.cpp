@@ -11,6 +11,7 @@
 #include <cstdlib>
 #include <filesystem>
 #include <new>
+#include <string_view>
 
 namespace taut {
 
@@ -49,9 +50,16 @@ int ending_in_words(std::function<int()> const& command) {
   } catch (Error const& error) {
     fmt::print(stderr, "taut: {}\n", error.what());
   } catch (std::bad_alloc const&) {
-    fmt::print(stderr, "taut: out of memory: lower the resolution\n");
+    fmt::print(stderr, "taut: out of memory: lower the resolution, or use fewer objects\n");
   } catch (std::exception const& error) {
-    fmt::print(stderr, "taut: {}\n", error.what());
+    // Kokkos has no type of its own for what it could not allocate.
+    std::string_view const words = error.what();
+    bool const memory = words.find("failed to allocate") != words.npos;
+    fmt::print(stderr, "taut: {}{}\n",
+               memory ? "out of memory: lower the resolution, or use fewer "
+                        "objects: "
+                      : "",
+               words);
   }
   return 1;
 }

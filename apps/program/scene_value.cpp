@@ -173,7 +173,8 @@ std::string Section::path(std::string_view key) const {
 
 SceneValue const& Section::at(std::string_view key) const {
   if (SceneValue const* value = find(key)) return *value;
-  throw Error("{}: {} lacks the key '{}'", place(), path_.empty() ? "the scene" : path_, key);
+  throw Error("{}: {} lacks the key '{}': add it", place(), path_.empty() ? "the scene" : path_,
+              key);
 }
 
 bool Section::flag(std::string_view key, bool fallback) const {

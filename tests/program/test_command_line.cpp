@@ -1,7 +1,17 @@
 // The command line of the program itself: what it takes, and what it says to what it does not.
 #include "command_line.hpp"
 
+#include <taut/apps/program/command_line.hpp>
+#include <taut/core/io/file.hpp>
+
+#include <Kokkos_Core.hpp>
+
+#include <fcntl.h>
+#include <unistd.h>
+
+#include <algorithm>
 #include <cstdlib>
+#include <new>
 
 using Catch::Matchers::ContainsSubstring;
 using namespace taut;
@@ -23,6 +33,32 @@ TEST_CASE("mistakes are answered by the nearest word, if any is near", "[cli]") 
   says("plan dragg", 1, "the nearest is \"drag\"");
   says("plan elephant", 1, "this name; `taut scenes`");
 }
+
+#ifdef NDEBUG  // the address sanitizer ends a program that asks for so much
+TEST_CASE("what does not fit into memory is answered by the mend", "[cli]") {
+  test::ScratchFolder const folder;
+  auto const said = folder.path() / "said";
+  // Kokkos throws something of its own, not std::bad_alloc.
+  for (bool const kokkos : {true, false}) {
+    std::fflush(stderr);
+    int const terminal = ::dup(2), file = ::open(said.c_str(), O_WRONLY | O_CREAT | O_TRUNC, 0600);
+    ::dup2(file, 2);
+    int const status = ending_in_words([&]() -> int {
+      if (!kokkos) throw std::bad_alloc();
+      return int(Kokkos::View<double*>("too_much", std::size_t(1) << 55).extent(0));
+    });
+    std::fflush(stderr);
+    ::dup2(terminal, 2);
+    ::close(terminal);
+    ::close(file);
+    CHECK(status == 1);
+    std::string const text = read_file(said);
+    CHECK_THAT(text, ContainsSubstring("taut: out of memory: lower the resolution"));
+    CHECK(std::count(text.begin(), text.end(), '\n') == 1);
+    CHECK((text.find("too_much") != text.npos) == kokkos);
+  }
+}
+#endif
 
 TEST_CASE("help has the program's name and an example everywhere", "[cli]") {
   says("--help", 0, "example: taut run");

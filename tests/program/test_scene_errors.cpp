@@ -187,14 +187,18 @@ TEST_CASE("files are looked for beside the scene, then in TAUT_DATA_DIR") {
       MessageMatches(ContainsSubstring("no/such/scene.toml: there is no such file")));
 }
 
-TEST_CASE("a nearly incompressible material is a warning that counts its elements") {
+TEST_CASE("a nearly incompressible material is a warning that names and counts its elements") {
   std::string const region =
       "[[object.region]]\nname = \"low\"\nselect = { box = [[-1, -1, -1], [1, 0, 1]] }\n"
       "material = { poisson = 0.495 }\n\n[[pin]]";
   auto const warnings = build_geometry(load(replaced(plain_scene, "[[pin]]", region))).warnings;
   REQUIRE(warnings.size() == 1);
-  CHECK_THAT(warnings[0], ContainsSubstring("80 of 144 tets have a poisson of 0.495: linear") &&
+  CHECK_THAT(warnings[0], ContainsSubstring("80 of 144 tets (") &&
+                              ContainsSubstring(", ...) have a poisson of 0.495: linear") &&
                               EndsWith("too little"));
+  auto const all = build_geometry(load(replaced(plain_scene, "poisson = 0.4", "poisson = 0.499")));
+  REQUIRE(all.warnings.size() == 1);
+  CHECK_THAT(all.warnings[0], ContainsSubstring("144 of 144 tets (0, 1, 2, 3, 4, 5, ...) have"));
 }
 
 TEST_CASE("a material that is unstable at rest is refused, with one that is not") {
