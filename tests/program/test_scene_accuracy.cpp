@@ -70,6 +70,21 @@ TEST_CASE("with the defaults, every scene's steps converge to Newton's", "[truth
   }
 }
 
+TEST_CASE("with the defaults, the first steps of scenes in full converge", "[truth]") {
+  // Meshes in full have ways for an element to be cut off that coarse ones have not: the pull of
+  // pose e is along one axis, which leaves volumes linear in the step but for round-off.
+  int scenes = 0;
+  for (auto const& entry : std::filesystem::directory_iterator(scene_folder())) {
+    std::string const name = entry.path().stem().string();
+    if (!name.starts_with("drag") || name == "drag_armadillo") continue;
+    INFO(name);
+    Trial const trial(name, {});
+    for (int k = 0; k < 2; ++k) CHECK(trial.simulation->step().converged());
+    ++scenes;
+  }
+  CHECK(scenes == 8);
+}
+
 TEST_CASE("with the defaults, steps from a random start converge", "[truth]") {
   Trial const trial("scrambled_random", {}, true);
   TetMesh const& mesh = trial.geometry.mesh;

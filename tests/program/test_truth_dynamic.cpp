@@ -230,6 +230,38 @@ TEST_CASE("F24: momentum of a free body", "[truth]") {
   }
 }
 
+TEST_CASE("F24: the order in which angular momentum is kept", "[truth]") {
+  // A stiff free body that turns by 0.8 rad: implicit Euler loses (omega h)^2 in each step, which
+  // is of first order in h over a given time.
+  ScratchFolder const folder;
+  double const rate = 10, end = 0.08;  // rad/s, s
+  std::string text = replaced(
+      replaced(plain_scene, "[[pin]]\nname = \"floor\"\nselect = { side = \"y_min\" }\n", ""),
+      "young = 1e5, poisson = 0.4, density = 1000 }",
+      "young = 1e8, poisson = 0.4, density = 1000 }\nvelocity = { axis = [0, 0, 1], "
+      "angular_velocity = 572.957795130823 }");
+  for (auto const& [integrator, order] :
+       {std::pair{"implicit_euler", 1.0}, std::pair{"bdf2", 2.0}}) {
+    double lost[2];
+    for (int k = 0; k < 2; ++k) {
+      int const steps = 16 << k;
+      Trial trial(load_scene(
+          folder.write("free.toml", text),
+          {false,
+           {"gravity=[0, 0, 0]", "solver.tolerance=1e-7", fmt::format("time.step={}", end / steps),
+            fmt::format("time.integrator={}", integrator)}}));
+      auto const mass = masses(trial.geometry);
+      double const start = spin(trial, mass)[2];
+      after(trial, steps);
+      lost[k] = 1 - spin(trial, mass)[2] / start;
+      UNSCOPED_INFO(integrator << ", " << steps << " steps: lost " << lost[k]);
+    }
+    CHECK(lost[1] > 0);
+    CHECK_THAT(std::log2(lost[0] / lost[1]), WithinAbs(order, 0.3));
+    if (order == 1) CHECK_THAT(lost[1], WithinRel(rate * rate * end * end / 32, 0.2));
+  }
+}
+
 TEST_CASE("a scrambled body finds its shape again", "[truth]") {
   std::vector<std::pair<std::string, std::vector<std::string>>> const bodies{
       {"scrambled_flat", {}},
