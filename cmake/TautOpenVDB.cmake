@@ -10,9 +10,12 @@ if(NOT TARGET OpenVDB::openvdb)
                         "OPENVDB_LIBRARY")
   endif()
   find_package(TBB REQUIRED)
+  # TBB is linked, but the definition that its target asks for in debug builds (TBB_USE_DEBUG) is not taken over: the
+  # libraries of a system were built without it, and ours shares its precompiled header with targets that see no TBB.
   add_library(OpenVDB::openvdb UNKNOWN IMPORTED)
   set_target_properties(OpenVDB::openvdb PROPERTIES
                         IMPORTED_LOCATION "${OPENVDB_LIBRARY}"
-                        INTERFACE_INCLUDE_DIRECTORIES "${OPENVDB_INCLUDE_DIR}"
-                        INTERFACE_LINK_LIBRARIES TBB::tbb)
+                        INTERFACE_INCLUDE_DIRECTORIES
+                        "${OPENVDB_INCLUDE_DIR};$<TARGET_PROPERTY:TBB::tbb,INTERFACE_INCLUDE_DIRECTORIES>"
+                        INTERFACE_LINK_LIBRARIES "$<LINK_ONLY:TBB::tbb>")
 endif()
