@@ -195,6 +195,11 @@ public:
            0;
   }
   void set_idle(IdleMask<Space> const& idle) const { state_->table.set_idle(idle); }
+  void mark_acting(Positions const& x, Fixed const& fixed, Array<int, Space> const& marks) const {
+    if (!state_->complete(x)) return;
+    using Kernel = kernels::MarkContacts<Precision, Space>;
+    for_each<Space>("contact_marks", pairs().count, Kernel{{pairs(), x}, fixed, marks});
+  }
 
   /// For friction: appends all pairs that act at x, with mu by the objects of the surface.
   void lag(Positions const& x, kernels::FrictionMatrix<Space> const& mu,
