@@ -165,6 +165,8 @@ public:
     ++counters_.skipped;
     return Touch::impossible;
   }
+  /// Whether an update may do without a search through the whole surface.
+  bool known() const { return neighbours_.known(); }
   /// Makes the next update search through the whole surface.
   void forget() {
     complete_ = false;
@@ -200,12 +202,13 @@ private:
     since_.leader = -1;
     moved_ = displacements_.measure(motion, since_).all;
     double const farthest = displacements_.bodies() > 1 ? moved_.between : moved_.within;
-    bool const paths = farthest > 2 * slack_ && follow(motion, 2 * farthest);
+    Lead const lead = farthest > 2 * slack_ ? follow(motion, 2 * farthest) : Lead{};
+    bool const paths = lead.vertex >= 0;
     reach_ = paths ? Displacement{2 * slack_, 2 * slack_}
                    : Displacement{moved_.within + 2 * slack_, moved_.between + 2 * slack_};
     Filter const near{activation_, reach_, paths ? motion : at_start};
     // What nearly rests is not followed, and asks for a reach of up to twice as far.
-    neighbours_.update(near, since_.leader, 4 * slack_);
+    neighbours_.update(near, lead, 4 * slack_);
     choose(near, candidates_.point_triangle);
     choose(near, candidates_.edge_edge);
     constexpr double infinity = std::numeric_limits<double>::infinity();
@@ -220,18 +223,18 @@ private:
             kernels::StillWithinReach<Precision, Space>{near}, near.motion.x);
   }
 
-  /// Names a leader, unless what goes far does so with all others: that has a long path and little
+  /// Names who leads, unless what goes far does so with all others: that has a long path and little
   /// to meet on it.
-  bool follow(Motion<Precision, Space> const& motion, double at_most) {
+  Lead follow(Motion<Precision, Space> const& motion, double at_most) {
     SurfaceViews<Space> const& surface = neighbours_.surface();
     kernels::LongestStep<Precision, Space> const step{surface, motion};
     int const n = surface.vertices();
     double const longest = maximum<Space>("candidate_step", n, 0.0, step);
-    if (longest > at_most) return false;
+    if (longest > at_most) return {};
     since_.leader = minimum<Space>("candidate_leader", n, std::numeric_limits<int>::max(),
                                    kernels::FindLeader<Precision, Space>{step, longest});
     for_each<Space>("candidate_lead", 3, kernels::KeepLead<Space>{since_});
-    return true;
+    return {since_.leader, longest};
   }
 
   template <PairKind kind>

@@ -195,6 +195,11 @@ public:
            0;
   }
   void set_idle(IdleMask<Space> const& idle) const { state_->table.set_idle(idle); }
+  void mark_acting(Positions const& x, Fixed const& fixed, Array<int, Space> const& marks) const {
+    if (!state_->complete(x)) return;
+    using Kernel = kernels::MarkContacts<Precision, Space>;
+    for_each<Space>("contact_marks", pairs().count, Kernel{{pairs(), x}, fixed, marks});
+  }
 
   /// For friction: appends all pairs that act at x, with mu by the objects of the surface.
   void lag(Positions const& x, kernels::FrictionMatrix<Space> const& mu,
@@ -306,18 +311,25 @@ private:
       // The candidates of a motion much longer than this one would burden the bound as well.
       if (swept_for > growth * std::max(portion, at_most * motion)) swept.forget();
       constexpr double far = 1 << 14;
-      for (double reach = portion;; reach *= growth) {
+      // At the start of a step energies need a search through the whole surface: it goes along all
+      // of a motion that is not too long, and serves them where that ends.
+      bool const anew = !near.known();
+      double const first = anew ? growth * portion : portion;
+      bool const along = anew && at_most * motion <= first;
+      for (double reach = first;; reach *= growth) {
         double const length = std::min(at_most, reach / motion);
-        double const alpha = bounded(x, p, length, motion);
+        bool const is_brief = anew ? along : length * motion <= brief;
+        double const alpha = bounded(is_brief, x, p, length, motion);
         if (alpha < length || length == at_most) return alpha;
         if (!std::isfinite(at_most) && reach >= far * portion) return alpha;
       }
     }
 
     /// The bound of a step of at most `length`, that is by `length` times `motion` metres.
-    double bounded(Positions const& x, Vectors const& p, double length, double motion) {
+    double bounded(bool is_brief, Positions const& x, Vectors const& p, double length,
+                   double motion) {
       // The candidates of such a motion are no burden to energies, which follow along it.
-      if (length * motion <= brief) return bounded_within(near, x, p, length);
+      if (is_brief) return bounded_within(near, x, p, length);
       std::int64_t const searches = swept.counters().searches;
       double const alpha = bounded_within(swept, x, p, length);
       if (swept.counters().searches > searches) swept_for = length * motion;

@@ -538,6 +538,20 @@ struct CountContacts : PairDistance<Precision, S> {
   }
 };
 
+/// Marks the free vertices of pairs that act.
+template <class Precision, class S>
+struct MarkContacts : PairDistance<Precision, S> {
+  FixedMask<S> fixed;
+  Array<int, S> marks;
+  KOKKOS_FUNCTION void operator()(int k) const {
+    if (!this->acts(k)) return;
+    for (int a = 0; a < 4; ++a) {
+      int const v = this->pairs.vertex(k, a);
+      if (!fixed(v)) Kokkos::atomic_store(&marks(v), 1);
+    }
+  }
+};
+
 /// Lowers to the share that is left of the activation distance.
 template <class Precision, class S>
 struct LeastGap : PairDistance<Precision, S> {

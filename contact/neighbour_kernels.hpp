@@ -313,6 +313,26 @@ struct AnchorAll {
   }
 };
 
+/// Anchors vertex i of the surface where it is `s` of its path on.
+template <class S>
+struct SettleAnchors {
+  SurfaceViews<S> surface;
+  double s;
+  Anchors<S> anchors;
+
+  KOKKOS_FUNCTION void operator()(int i) const { settle(surface.vertex(i)); }
+  [[gnu::noinline]] KOKKOS_FUNCTION void settle(int v) const {
+    double error = 0;
+    for (int c = 0; c < 3; ++c) {
+      double const from = anchors.at.from(v, c), path = anchors.at.path(v, c);
+      anchors.at.from(v, c) = from + s * path;
+      anchors.at.path(v, c) = 0;
+      error += 2 * Kokkos::Experimental::epsilon_v<double> * (Kokkos::abs(from) + Kokkos::abs(path));
+    }
+    anchors.radius(v) -= error;
+  }
+};
+
 /// Whether a primitive of `corners` vertices has a stray one.
 template <class S, int corners>
 struct HasStray {

@@ -16,6 +16,10 @@
 // keeps to its r. A vertex that does not is anchored anew, by itself, where it is: the pairs of its
 // primitives are dropped from the list, and these search again. In a pile most vertices move little
 // while a few move far, so such a search is for few.
+//
+// Once a part s of a motion by more than an edge has been gone, all are anchored where they are on
+// it, A + s P, without a path, and what was near on the way alone is dropped from the list. Shorter
+// ones are kept: the next motion is often the same in part.
 #pragma once
 
 #include <taut/contact/neighbour_kernels.hpp>
@@ -39,6 +43,12 @@ public:
     for_each<S>("neighbours_drop", count_,
                 kernels::KeepsAnchors<kind, S>{{surface, pairs_}, stray, place_});
     compact(pairs_, notes_, 0, count_);
+  }
+  /// Keeps those that the filter keeps.
+  template <class Filter, class Positions>
+  void keep(SurfaceViews<S> const& surface, Filter const& filter, Positions const& x) {
+    std::swap(pairs_, found_);
+    append(std::exchange(count_, 0), surface, filter, x);
   }
   /// Makes room for `n` pairs that are to be judged.
   kernels::WritePrimitives<S> room(std::int64_t n) {
@@ -64,7 +74,8 @@ private:
                int count) {
     Kokkos::View<int*, typename S::memory> const place(place_, Kokkos::make_pair(0, count));
     int const kept = exclusive_scan<S, int>("neighbours_place", place);
-    bool const in_place = first > 0 && pairs_.extent_int(0) >= first + kept;
+    bool const in_place = first > 0 && pairs_.extent_int(0) >= first + kept &&
+                          notes_.distance.extent_int(0) >= first + kept;
     PrimitivePairs<S> to = in_place ? pairs_ : spare_;
     kernels::NoteFields<S> notes_to = in_place ? notes_ : spare_notes_;
     if (!in_place) {
@@ -87,6 +98,12 @@ private:
   kernels::NoteFields<S> notes_, spare_notes_, judged_;
   Kokkos::View<int*, typename S::memory> place_;
   int count_ = 0;
+};
+
+/// Who leads a motion that is followed: a vertex that goes as far as any, and how far.
+struct Lead {
+  int vertex = -1;    ///< -1: nobody; it is not followed
+  double length = 0;  ///< m
 };
 
 struct NeighbourCounters {
@@ -114,6 +131,7 @@ public:
         triangles_(params, surface.triangles(), edge_length),
         inquiry_(std::max({surface.vertices(), surface.edges(), surface.triangles()})),
         least_radius_(skin / 2),
+        long_path_(edge_length),
         reducer_(surface.vertices(), 6),
         stray_("neighbour_stray", surface.object.extent(0)),
         place_("neighbour_asks", std::max(surface.edges(), surface.triangles())),
@@ -123,17 +141,21 @@ public:
     anchors_.radius = Array<double, Space>("neighbour_radius", n);
   }
 
-  /// Makes the list hold all pairs that `near` keeps. `leader`: if its motion is followed, a vertex
-  /// that goes far in it, or -1; `reach`: no less, m, if it searches through the whole surface.
-  /// Throws Error for places that are not finite, and for more pairs than an int can count.
-  void update(kernels::WithinReach<Precision, Space> const& near, int leader, double reach) {
+  /// Makes the list hold all pairs that `near` keeps, whose motion is followed if somebody leads
+  /// it; `reach`: no less, m, if it searches through the whole surface. Throws Error for places
+  /// that are not finite, and for more pairs than an int can count.
+  void update(kernels::WithinReach<Precision, Space> const& near, Lead const& lead, double reach) {
     auto const& motion = near.motion;
     int const n = surface().vertices();
     if (n == 0) return;
     bool const holds = known_ && found_for(motion) && near.reach.within <= reach_.within &&
                        near.reach.between <= reach_.between;
     if (holds) {
-      Seen const seen = look(motion);
+      Seen seen = look(motion);
+      if (seen.s[0] > 0 && lead_.length > long_path_) {
+        settle(near, seen.s[0]);
+        seen = look(motion);
+      }
       kernels::FindStrays<Precision, Space> const find{surface(), seen, anchors_.radius,
                                                        least_radius_, stray_};
       int const strays = join_all<Space>("neighbour_strays", n, find);
@@ -153,16 +175,18 @@ public:
     known_ = false;
     ++counters_.full;
     reach_ = {std::max(near.reach.within, reach), std::max(near.reach.between, reach)};
-    anchors_.at.leader = leader;
+    lead_ = lead;
+    anchors_.at.leader = lead.vertex;
     for_each<Space>("neighbour_anchors", n,
                     kernels::AnchorAll<Precision, Space>{
                         surface(), {motion, anchors_.at}, least_radius_, anchors_});
-    if (leader >= 0) {
+    if (lead.vertex >= 0) {
       for_each<Space>("neighbour_lead", 3, kernels::KeepLead<Space>{anchors_.at});
     }
     search_all(near);
     remember(motion);
   }
+  bool known() const { return known_; }
   /// Makes the next update search through the whole surface.
   void forget() { known_ = false; }
 
@@ -227,6 +251,15 @@ private:
   kernels::NearAnchors<Space> filter(kernels::WithinReach<Precision, Space> const& near) const {
     return {{near.activation, reach_, anchors_.motion()}, anchors_.radius};
   }
+  /// Anchors all where they are on their path, and drops the pairs that were near on it alone.
+  void settle(kernels::WithinReach<Precision, Space> const& near, double s) {
+    for_each<Space>("neighbour_anchors", surface().vertices(),
+                    kernels::SettleAnchors<Space>{surface(), s, anchors_});
+    anchors_.at.leader = -1;
+    lead_ = {};
+    point_triangle_.keep(surface(), filter(near), anchors_.at.from);
+    edge_edge_.keep(surface(), filter(near), anchors_.at.from);
+  }
   /// Boxes around the anchors.
   void compute_boxes(kernels::WithinReach<Precision, Space> const& near) {
     double const reach = std::max(reach_.within, reach_.between);
@@ -283,7 +316,8 @@ private:
   SurfaceBoxes<Space> boxes_;
   Policy points_, edges_, triangles_;
   BoxInquiry<Space> inquiry_;
-  double least_radius_ = 0;
+  double least_radius_ = 0, long_path_ = 0;
+  Lead lead_;
   Displacement reach_;
   kernels::Anchors<Space> anchors_;
   Reducer<Space, double> reducer_;

@@ -120,6 +120,11 @@ public:
                     kernels::ObstacleShares<Form, Space>{Form{table(), x, p}, scale, shares});
   }
 
+  void mark_acting(Positions const& x, Fixed const&, Array<int, Space> const& marks) const {
+    for_each<Space>("obstacle_marks", vertices(),
+                    kernels::MarkTouched<Barrier, Table, Space>{table(), x, marks});
+  }
+
   void add_gradient(Positions const& x, double scale, Fixed const&, Vectors const& g) const {
     gradient<0>(x, scale, g, g);
   }

@@ -273,6 +273,20 @@ struct ObstacleAssemble {
   KOKKOS_FUNCTION void operator()(int i) const { add(i); }
 };
 
+/// Marks the vertices on which faces act.
+template <class Barrier, class Table, class S>
+struct MarkTouched {
+  Table table;
+  typename Table::Positions x;
+  Array<int, S> marks;
+  KOKKOS_FUNCTION void operator()(int i) const {
+    if (touched(i)) marks(table.vertex(i)) = 1;
+  }
+  [[gnu::noinline]] KOKKOS_FUNCTION bool touched(int i) const {
+    return table.free(i) && obstacle_force<Barrier>(table, i, x, false).contacts > 0;
+  }
+};
+
 /// The force on the bodies, N, and how many faces act.
 template <class Barrier, class Table>
 struct SumObstacleForces {

@@ -25,6 +25,7 @@ struct Heading {
   /// construction (L-BFGS, Newton) and anything below zero will do.
   double descent = 0;
   double metric = 0;    ///< p'M p
+  double form = 0;      ///< p'H p where the method has found it; 0: not known
   double gradient = 0;  ///< g' M^-1 g
   double beta = 0, gamma = 0;
   double first_length = 0;  ///< step to try first; 0: that of the quadratic model
@@ -237,6 +238,7 @@ private:
     Line<E> line(e_, x_, fields_,
                  curvature_due ? preconditioner_.curvature() : LocalMatrices<P, S>(), heading.slope,
                  largest_decrement_, rule_.negligible());
+    if (heading.form > 0) line.know_curvature(heading.form);
     if (!scale_.has_inertia) line.curvature();
     step_ = search_(line, heading.first_length);
     report_.backtracks += step_.backtracks;

@@ -15,10 +15,13 @@
 
 namespace taut {
 
-/// What a minimiser may take apart. Without effect on a scene of one body, on preconditioners that
-/// couple unknowns, and in quasi-static solves, where nothing bounds what a free body does.
+/// What a minimiser may take apart. Islands are without effect on a scene of one body, on
+/// preconditioners that couple unknowns, and in quasi-static solves, where nothing bounds what a
+/// free body does.
 struct Splitting {
   bool by_islands = true;  ///< own direction weight, step length, bound and end for each island
+  bool by_regions =
+      false;  ///< instead: own weight and length for what contact acts on (regions.hpp)
 };
 
 namespace kernels {

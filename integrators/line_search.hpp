@@ -60,6 +60,8 @@ public:
     return form_;
   }
   double known_curvature() const { return form_; }
+  /// Whoever has found p'Hp already may say so.
+  void know_curvature(double form) { form_ = form; }
   /// The step of the quadratic model, -g'p / p'Hp; infinity where no curvature is left along p, 0
   /// where nothing is to be gained.
   double newton_length() {

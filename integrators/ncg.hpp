@@ -8,6 +8,7 @@
 #include <taut/integrators/conjugate_dots.hpp>
 #include <taut/integrators/descent.hpp>
 #include <taut/integrators/island_descent.hpp>
+#include <taut/integrators/regions.hpp>
 
 namespace taut {
 namespace kernels {
@@ -50,20 +51,24 @@ public:
   /// Without safeguard, s'y <= 0 is left to the formula.
   template <class Params>
   explicit ConjugateDirections(Params const& params)
-      : beta_(params.beta), safeguard_(params.safeguard.on) {}
+      : beta_(params.beta),
+        safeguard_(params.safeguard),
+        by_regions_(params.splitting.by_regions) {}
 
   /// Memory for P g, unless P is pointwise.
   void resize(int n, bool pointwise) {
     z_ = pointwise ? Vectors() : z_memory_.resize("z", n);
     z_before_ = pointwise ? Vectors() : z_before_memory_.resize("z_before", n);
+    if (by_regions_) regions_.resize(n);
   }
 
   /// Whether to go by islands (island_descent.hpp).
   template <class E, class M, class Params>
   bool splits(E& e, M const& preconditioner, Params const& params) const {
     if constexpr (DivisibleObjective<E>) {
-      return params.splitting.by_islands && preconditioner.pointwise() && e.scale().has_inertia &&
-             e.divisible() && (e.bodies().count > 1 || !e.asleep().empty());
+      return params.splitting.by_islands && !params.splitting.by_regions &&
+             preconditioner.pointwise() && e.scale().has_inertia && e.divisible() &&
+             (e.bodies().count > 1 || !e.asleep().empty());
     } else {
       return false;
     }
@@ -87,7 +92,7 @@ public:
   void restart() { restarted_ = true; }
 
   template <class E, class M>
-  Heading next(E&, VectorField<typename P::position, S> const&, DescentFields<P, S>& fields,
+  Heading next(E& e, VectorField<typename P::position, S> const& x, DescentFields<P, S>& fields,
                M const& preconditioner, Step const& last, bool renewed) {
     kernels::PreconditionedGradient<P, S> preconditioned{
         fields.gradient, fields.gradient_before, preconditioner.curvature(), {}, {}};
@@ -97,6 +102,14 @@ public:
       if (renewed && !restarted_) preconditioner.apply(fields.gradient_before, z_before_);
       preconditioned.z = z_;
       preconditioned.z_before = z_before_;
+    }
+
+    if constexpr (RegionalObjective<E>) {
+      if (by_regions_ && restarted_) two_regions_ = regions_.divide(e, x);
+      if (two_regions_) {
+        restarted_ = false;
+        return regions_.next(e, x, fields, preconditioned, beta_, safeguard_, last.length);
+      }
     }
 
     using Dot = kernels::ConjugateDots<P, S>;
@@ -118,7 +131,7 @@ public:
     if (!restarted_) {
       kept = beta_(dots_);
       bool const finite = std::isfinite(kept.beta) && std::isfinite(kept.gamma);
-      heading.lost = safeguard_ && (dots_.y_p <= 0 || !finite);
+      heading.lost = safeguard_.on && (dots_.y_p <= 0 || !finite);
       if (heading.lost) kept = {};
     }
     restarted_ = false;
@@ -141,12 +154,14 @@ public:
 
 private:
   B beta_;
-  bool safeguard_;
-  bool restarted_ = true;
+  Safeguard safeguard_;
+  bool by_regions_;
+  bool restarted_ = true, two_regions_ = false;
   Dots dots_;
   Vectors z_, z_before_;
   Resizable<Vectors> z_memory_, z_before_memory_;
   Islands<P, S> islands_;
+  RegionDirections<P, S> regions_;
 };
 
 template <class Beta, class Preconditioner, class LineSearch, class Stopping>

@@ -82,6 +82,7 @@ private:
     params.safeguard.on = options_.flag("safeguard");
     if constexpr (requires { params.splitting; }) {
       params.splitting.by_islands = options_.flag("islands");
+      params.splitting.by_regions = options_.flag("regions");
     }
     return std::make_unique<Holder<Minimiser>>(params);
   }

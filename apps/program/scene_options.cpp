@@ -126,6 +126,12 @@ std::span<OptionKey const> solver_keys() {
        {},
        "bodies that may touch have a direction weight, a step, a bound and an end of their own: "
        "nonlinear CG with inertia and a pointwise preconditioner, on several bodies"},
+      {"regions",
+       false,
+       {},
+       {},
+       "nonlinear CG, instead of islands: what contact acts on has a direction weight and a step of "
+       "its own, and what is free has others"},
       {"sleep_speed",
        0.0,
        {.min = 0, .max = 1e9, .unit = "m/s"},

@@ -268,14 +268,14 @@ private:
     if (!(speed > 0)) return {};
     std::string const& preconditioner = scene_.solver.text("preconditioner");
     std::string const& method = scene_.solver.text("method");
-    bool const by_islands = scene_.solver.flag("islands") &&
+    bool const by_islands = scene_.solver.flag("islands") && !scene_.solver.flag("regions") &&
                             !preconditioner.starts_with("schwarz") && method != "newton" &&
                             method != "lbfgs" && method != "chebyshev";
     if (!by_islands || scene_.scheme == TimeScheme::quasi_static) {
       throw Error(
           "{}: solver.sleep_speed needs islands, which method = \"{}\" with preconditioner = "
           "\"{}\" does not go by here: choose nonlinear CG with inertia, a pointwise "
-          "preconditioner and islands = true, or sleep_speed = 0",
+          "preconditioner, islands = true and regions = false, or sleep_speed = 0",
           scene_.file.string(), method, preconditioner);
     }
     return {.on = true, .speed = speed, .steps = scene_.solver.integer("sleep_steps")};

@@ -122,6 +122,9 @@ public:
   void set_idle(IdleMask<Space> const& idle) const {
     for (auto const& t : terms_) t->set_idle(idle);
   }
+  void mark_acting(Positions const& x, Fixed const& fixed, Array<int, Space> const& marks) const {
+    for (auto const& t : terms_) t->mark_acting(x, fixed, marks);
+  }
 
   void begin_step(StepStart<Precision, Space> const& start) const requires stepped {
     for (auto const& t : terms_) t->begin_step(start);
@@ -175,6 +178,7 @@ private:
     virtual void lasting_elements(std::vector<Connectivity>&) const = 0;
     virtual bool link(Fixed const&, Indices const&, Indices const&) const = 0;
     virtual void set_idle(IdleMask<Space> const&) const = 0;
+    virtual void mark_acting(Positions const&, Fixed const&, Array<int, Space> const&) const = 0;
     virtual void begin_step(StepStart<Precision, Space> const&) const = 0;
     virtual bool relag(Positions const&) const = 0;
     virtual double motion_left(Positions const&) const = 0;
@@ -260,6 +264,10 @@ private:
     }
     void set_idle(IdleMask<Space> const& idle) const override {
       if constexpr (IdlingTerm<Term>) term.set_idle(idle);
+    }
+    void mark_acting(Positions const& x, Fixed const& fixed,
+                     Array<int, Space> const& marks) const override {
+      if constexpr (MarkingTerm<Term>) term.mark_acting(x, fixed, marks);
     }
     void begin_step(StepStart<Precision, Space> const& start) const override {
       if constexpr (SteppedTerm<Term>) term.begin_step(start);

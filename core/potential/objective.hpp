@@ -92,6 +92,15 @@ concept CertifyingObjective = Objective<E> &&
   { e.max_step(x, p, at_most, certified) } -> std::convertible_to<double>;
 };
 
+/// An Objective that says where something acts on it that does not act always, such as contact.
+template <class E>
+concept RegionalObjective = Objective<E> &&
+    requires(E& e, VectorField<typename E::Precision::position, typename E::Space> const& x,
+             Array<int, typename E::Space> const& marks) {
+  /// 1 for unknowns on which it acts at x, 0 for the others.
+  {e.mark_acting(x, marks)};
+};
+
 /// An Objective that knows of bodies and islands (bodies.hpp), and can leave some out.
 template <class E>
 concept DivisibleObjective = Objective<E> &&

@@ -538,6 +538,11 @@ public:
   void set_idle(IdleMask<Space> const& idle) const {
     for_each_of<is_idling>([&](auto const& term) { term.set_idle(idle); });
   }
+  /// For minimisers that go by regions (RegionalObjective).
+  void mark_acting(Positions const& x, Array<int, Space> const& marks) const {
+    assign_on<Space>(marks, 0);
+    for_each_of<is_marking>([&](auto const& term) { term.mark_acting(x, unknowns_.fixed, marks); });
+  }
   /// Bodies that are to stay where they are, at rest, unless something comes to act on them; empty:
   /// none. Minimisers that go by islands heed it, and say who has been woken.
   void set_asleep(std::vector<char> asleep) { asleep_ = std::move(asleep); }
@@ -609,6 +614,8 @@ private:
   using is_linking = std::bool_constant<LinkingTerm<Term>>;
   template <class Term>
   using is_idling = std::bool_constant<IdlingTerm<Term>>;
+  template <class Term>
+  using is_marking = std::bool_constant<MarkingTerm<Term>>;
   template <class Term>
   using is_obstructed = std::bool_constant<ObstructedTerm<Term>>;
 

@@ -203,6 +203,16 @@ concept IdlingTerm = SweptTerm<Term> &&
   {term.set_idle(idle)};
 };
 
+/// A term that does not act everywhere and always, and says where it does: gives 1 to the marks of
+/// the free unknowns on which it acts at x, and leaves the others as they are.
+template <class Term>
+concept MarkingTerm = SweptTerm<Term> &&
+    requires(Term const& term,
+             VectorField<typename Term::Precision::position, typename Term::Space> x,
+             FixedMask<typename Term::Space> fixed, Array<int, typename Term::Space> marks) {
+  {term.mark_acting(x, fixed, marks)};
+};
+
 /// Whether minimisers may go by bodies and islands where this term is.
 template <SweptTerm Term>
 bool divides(Term const& term) {

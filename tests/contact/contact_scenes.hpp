@@ -72,13 +72,14 @@ struct Squashed {
 struct Oracle {
   double energy = 0, smallest_gap = 1;
   int contacts = 0;
+  std::vector<int> acting;  ///< per vertex: 1 if it is of a contact
   std::vector<Point> gradient;
   std::vector<double> hessian;
 
   /// K = P min(areas) / (4 dhat), areas as thirds of triangles.
   Oracle(Surface const& surface, std::vector<Point> const& rest, std::vector<Point> const& x,
          double dhat, double cap, double pressure)
-      : gradient(x.size()), hessian(9 * x.size() * x.size()) {
+      : acting(x.size()), gradient(x.size()), hessian(9 * x.size() * x.size()) {
     std::vector<double> area(x.size());
     for (Triangle const& t : surface.triangles) {
       double const whole =
@@ -93,6 +94,7 @@ struct Oracle {
       if (a > 0) smallest_gap = std::min(smallest_gap, d / a);
       if (!(d < a)) return;
       ++contacts;
+      for (int k : v) acting[k] = 1;
       bool const edges = pair.kind == PairKind::edge_edge;
       double const patch =
           edges ? std::min((area[v[0]] + area[v[1]]) / 6, (area[v[2]] + area[v[3]]) / 6)

@@ -161,6 +161,22 @@ TEMPLATE_TEST_CASE("contact is the sum over all pairs", "[contact]", Fp64, Mixed
   CHECK_THAT(report.smallest_gap, WithinRel(oracle.smallest_gap, tolerance));
 }
 
+TEST_CASE("contact marks the free vertices of what acts", "[contact]") {
+  Fixture<Fp64> f;
+  Oracle const oracle = f.oracle();
+  Array<int, DefaultSpace> const marks("marks", oracle.acting.size());
+  f.contact.mark_acting(f.x, f.unknowns.fixed, marks);
+  bool same = true;
+  int marked = 0;
+  for (std::size_t v = 0; v < oracle.acting.size(); ++v) {
+    same = same && marks(v) == (f.unknowns.fixed(v) ? 0 : oracle.acting[v]);
+    marked += marks(v);
+  }
+  CHECK(same);
+  CHECK(marked > 10);
+  CHECK(marked < int(oracle.acting.size()));
+}
+
 TEST_CASE("energy, gradient, curvature and matrix belong together", "[contact]") {
   Fixture<Fp64> f;
   double const scale = 0.25, step = 1e-6;
