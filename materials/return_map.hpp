@@ -56,7 +56,7 @@ KOKKOS_FUNCTION Vec3<T> raised(Vec3<T> const& s) {
 
 template <class T>
 KOKKOS_FUNCTION T mean(Vec3<T> const& a) {
-  return (a[0] + a[1] + a[2]) / 3;
+  return (a[0] + a[1] + a[2]) / T(3);
 }
 
 template <class T>

@@ -1,8 +1,10 @@
 // Elastic energy of material points, V(x) = Sum_p V_p Psi(F_p(x)), as a function of the displaced
-// places of the nodes of a grid: a swept term of the potential, for any material that tets take.
+// places of the nodes of a grid: a swept term of the potential, for any material that tets take,
+// and for those whose points yield within a step by what they remember (particle_memory.hpp).
 //
 // The grid, and which particle sees which node, change from step to step: `update` before each.
-// Copies share nothing that changes within a step, so a Potential made after `update` may hold one.
+// Copies share nothing that changes within a step but what lags, so a Potential made after `update`
+// may hold one.
 #pragma once
 
 #include <taut/core/exec/copy.hpp>
@@ -11,6 +13,7 @@
 #include <taut/core/report/error.hpp>
 #include <taut/mpm/characteristic_force.hpp>
 #include <taut/mpm/particle_assembly.hpp>
+#include <taut/mpm/particle_memory.hpp>
 #include <taut/mpm/particle_split.hpp>
 
 namespace taut {
@@ -100,6 +103,7 @@ public:
     auto const host = Kokkos::create_mirror_view(norms);
     for (std::size_t k = 0; k < materials.size(); ++k) {
       host(k) = norm_at_rest<Material>(materials[k]);
+      if constexpr (RememberingMaterial<Material>) lags_ = lags_ || Material::lags(materials[k]);
     }
     assign(norms, host);
     norms_ = norms;
@@ -131,7 +135,27 @@ public:
       reducer_ = Reducer<Space, Sum>::of_partials(reducible_);
     }
     grow(bounds_, "particle_bounds", blocks_.patches);
+    if constexpr (RememberingMaterial<Material>) {
+      grow(memory_.data, "particle_memory", std::size_t(memory_.numbers) * slots);
+      using Kernel_ = kernels::Remember<Space, Precision, Material, K, lanes>;
+      for_each<Space>("remember", blocks_.patches,
+                      Kernel_{blocks_, particles, materials_, memory_});
+      if (lags_) lag_reducer_.provide(blocks_.patches, 2);
+    }
   }
+  /// Takes what lags behind as it is at x (LaggedTerm): the radius at which sand yields. False if
+  /// that changes by less than `lag_change` of it, rms.
+  bool relag(Positions const& x) const requires RememberingMaterial<Material> {
+    if (!lags_) return false;
+    using Reader = kernels::PointReader<Space, Real, K>;
+    using Nodes = kernels::Displacement<Space, typename Precision::position>;
+    using Kernel_ = kernels::RememberAnew<Reader, Space, Precision, Material, Nodes>;
+    auto const sums = lag_reducer_.template sum<2>(
+        "remember_anew", blocks_.patches,
+        Kernel_{{blocks_, data_}, particles_, materials_, {x, rest_}, dx_, memory_});
+    return double(sums[0]) > lag_change * lag_change * double(sums[1]);
+  }
+  static constexpr double lag_change = 1e-2;
 
   double value(Positions const& x, double scale) const {
     return scale * measured<kernels::Measure::energy>("particle_energy", x, Vectors(), 0);
@@ -272,7 +296,7 @@ private:
   }
 
   kernels::ParticleSweep<Space, Precision, Material, K, packed_> frame(Positions const& x) const {
-    return {{blocks_}, data_, materials_, {x, rest_}, static_cast<Real>(dx_)};
+    return {{blocks_}, data_, materials_, {x, rest_}, static_cast<Real>(dx_), memory_};
   }
   template <class Kernel_>
   void run(char const* name, Kernel_ const& kernel) const {
@@ -324,7 +348,9 @@ private:
   double dx_ = 1;
   std::int64_t version_ = 0;
   List<Real> data_;
-  Reducer<Space, Sum> reducer_;
+  kernels::PointMemory<Space, Real> memory_;  ///< of a material that remembers
+  bool lags_ = false;
+  Reducer<Space, Sum> reducer_, lag_reducer_;
   mutable List<Real> partial_;
   List<double> bounds_;  ///< what the sweep of the moment says of each patch
   mutable std::vector<int> cell_nodes_;
@@ -366,7 +392,8 @@ void ElasticParticles<Material, K, Precision, Space, packed>::add_to(
                             fixed,
                             matrix,
                             dx_,
-                            scale});
+                            scale,
+                            memory_});
   }
 }
 

@@ -12,6 +12,7 @@
 
 #include <taut/core/fem/elastic_kernels.hpp>
 #include <taut/mpm/block_sweep.hpp>
+#include <taut/mpm/particle_memory.hpp>
 
 namespace taut::kernels {
 
@@ -35,9 +36,21 @@ struct ParticleSweep : BlockSweep<S, typename Precision::real, K, packed> {
   Kokkos::View<typename Material::template Parameters<double> const*, typename S::memory> materials;
   Displacement<S, typename Precision::position> displacement;
   Real dx;
+  PointMemory<S, Real> memory;  ///< of a material that remembers
 
-  KOKKOS_FORCEINLINE_FUNCTION auto lame(int patch) const {
+  KOKKOS_FORCEINLINE_FUNCTION auto material(int patch) const {
     return Material::template cast<T>(materials(this->blocks.material(patch)));
+  }
+  /// That of a group of particles: with what they remember.
+  template <class Parameters>
+  KOKKOS_FORCEINLINE_FUNCTION Parameters own(Parameters const& of_patch, int patch, int g) const {
+    if constexpr (RememberingMaterial<Material>) {
+      int const slot = this->blocks.slot_begin(patch) + g * Base::width;
+      return Material::with(of_patch, memory.template at<T, Base::lanes>(slot));
+    } else {
+      (void)patch, (void)g;
+      return of_patch;
+    }
   }
   /// How a field on the nodes changes F.
   KOKKOS_FORCEINLINE_FUNCTION Mat3<T> change_of_F(Weights<K, T> const& at,
@@ -134,7 +147,7 @@ struct ParticleGradient : ParticleSweep<S, Precision, Material, K, packed> {
     if (after_step) this->load_relative(team, patch, p, local_p);
     this->clear(team, rows, numbers());
     team.team_barrier();
-    auto const lame = this->lame(patch);
+    auto const of_patch = this->material(patch);
     auto const points = this->points(patch, this->data.data());
     double energy = 0;
     auto const body = [&](int g, bool active) __attribute__((always_inline)) {
@@ -142,11 +155,12 @@ struct ParticleGradient : ParticleSweep<S, Precision, Material, K, packed> {
       Weights<K, T> const at = points.weights(g);
       Mat3<T> const before = points.deformation(g);
       T const weight = T(scale) * points.weight(g);
+      auto const own = this->own(of_patch, patch, g);
       auto state =
-          Material::evaluate(lame, before + this->change_of_F(at, corner, local_x.data(), before));
+          Material::evaluate(own, before + this->change_of_F(at, corner, local_x.data(), before));
       if (after_step) {
         Mat3<T> const dF = T(alpha) * this->change_of_F(at, corner, local_p.data(), before);
-        double const change_here = sum_lanes(T(weight * Material::change(lame, state, dF)));
+        double const change_here = sum_lanes(T(weight * Material::change(own, state, dF)));
         if (active) energy += change_here;
       }
       Material::weigh(state, weight);
@@ -199,14 +213,15 @@ struct ParticleProduct : ParticleSweep<S, Precision, Material, K, packed> {
     this->load_relative(team, patch, p, local_p);
     this->clear(team, rows, 3);
     team.team_barrier();
-    auto const lame = this->lame(patch);
+    auto const of_patch = this->material(patch);
     auto const points = this->points(patch, this->data.data());
     auto const body = [&](int g, bool active) __attribute__((always_inline)) {
       std::uint16_t const* const corner = points.corners(g);
       Weights<K, T> const at = points.weights(g);
       Mat3<T> const before = points.deformation(g);
       auto state =
-          Material::evaluate(lame, before + this->change_of_F(at, corner, local_x.data(), before));
+          Material::evaluate(this->own(of_patch, patch, g),
+                             before + this->change_of_F(at, corner, local_x.data(), before));
       Material::weigh(state, T(scale) * points.weight(g));
       Mat3<T> const dP =
           Material::frame(state).apply(this->change_of_F(at, corner, local_p.data(), before));
@@ -247,7 +262,7 @@ struct ParticleMeasure : ParticleSweep<S, Precision, Material, K, packed> {
     this->load_relative(team, patch, this->displacement, local_x);
     if constexpr (measure != Measure::energy) this->load_relative(team, patch, p, local_p);
     team.team_barrier();
-    auto const lame = this->lame(patch);
+    auto const of_patch = this->material(patch);
     auto const points = this->points(patch, this->data.data());
     [[maybe_unused]] InversionCertificate<T> const certificate =
         this->certificate(certifies ? this->largest(team, local_x) : Real(0),
@@ -259,17 +274,18 @@ struct ParticleMeasure : ParticleSweep<S, Precision, Material, K, packed> {
       Weights<K, T> const at = points.weights(g);
       Mat3<T> const before = points.deformation(g);
       Mat3<T> F = before + this->change_of_F(at, corner, local_x.data(), before);
+      auto const own = this->own(of_patch, patch, g);
       T density;
       if constexpr (measure == Measure::energy) {
-        density = Material::energy(lame, F);
+        density = Material::energy(own, F);
       } else {
         Mat3<T> dF = this->change_of_F(at, corner, local_p.data(), before);
         if constexpr (measure == Measure::change) {
           dF = T(alpha) * dF;
           F = F + dF;
-          density = Material::change(lame, Material::evaluate(lame, F), dF);
+          density = Material::change(own, Material::evaluate(own, F), dF);
         } else {
-          density = Material::quadratic(Material::evaluate(lame, F), dF);
+          density = Material::quadratic(Material::evaluate(own, F), dF);
           if constexpr (certifies) {
             square_length =
                 min(square_length, certificate.square_length(this->noise(before), F, dF));

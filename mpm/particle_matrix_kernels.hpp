@@ -124,6 +124,7 @@ struct AssembleBlocks {
   FixedMask<S> fixed;
   Matrix matrix;
   double dx, scale;
+  PointMemory<S, Real> memory;
 
   KOKKOS_FUNCTION void operator()(int k) const {
     int const block = order(first + k);
@@ -140,7 +141,12 @@ struct AssembleBlocks {
     Mat3<double> const before = reader.deformation(slot);
     Mat3<double> const F =
         before + ((1 / dx) * reader.gradient(slot, blocks.nodes_of(patch), displacement)) * before;
-    auto const frame = Material::frame(Material::evaluate(materials(blocks.material(patch)), F));
+    auto own = materials(blocks.material(patch));
+    if constexpr (RememberingMaterial<Material>) {
+      auto const [limit, gained] = memory.template at<Real, decltype(reader)::lanes>(slot);
+      own = Material::with(own, YieldMemory<double>{double(limit), double(gained)});
+    }
+    auto const frame = Material::frame(Material::evaluate(own, F));
     double const weight = scale * reader.number(slot, 12);
     Weights<K, double> const at = reader.weights(slot);
     Mat3<double> const to_beta = (1 / dx) * (transpose(frame.V) * transpose(before));

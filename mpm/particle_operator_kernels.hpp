@@ -35,7 +35,7 @@ struct LineariseParticles : ParticleSweep<S, Precision, Material, K, packed> {
     Local const local_x(team.team_scratch(0), 4 * Base::nodes);
     this->load_relative(team, patch, this->displacement, local_x);
     team.team_barrier();
-    auto const lame = this->lame(patch);
+    auto const of_patch = this->material(patch);
     auto const points = this->points(patch, this->data.data());
     Real* const out = to.data() + std::size_t(operator_numbers) * this->blocks.slot_begin(patch);
     auto const body = [&](int g) __attribute__((always_inline)) {
@@ -43,7 +43,7 @@ struct LineariseParticles : ParticleSweep<S, Precision, Material, K, packed> {
                         g % Base::per_pack * Base::width;
       Mat3<T> const before = points.deformation(g);
       auto const state = Material::evaluate(
-          lame,
+          this->own(of_patch, patch, g),
           before + this->change_of_F(points.weights(g), points.corners(g), local_x.data(), before));
       auto const frame = Material::frame(state);
       T const weight = T(scale / (this->dx * this->dx)) * points.weight(g);

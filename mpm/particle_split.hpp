@@ -112,7 +112,7 @@ struct SplitParticles : ParticleSweep<S, Precision, Material, K, packed> {
     this->load_relative(team, patch, this->displacement, local_x);
     this->clear(team, rows, 3);
     team.team_barrier();
-    auto const material = this->lame(patch);
+    auto const of_patch = this->material(patch);
     T const k(static_cast<Real>(stiffness(this->blocks.material(patch))));
     auto const points = this->points(patch, this->data.data());
     Real* const all = state.data() + std::size_t(split_numbers) * this->blocks.slot_begin(patch);
@@ -123,6 +123,7 @@ struct SplitParticles : ParticleSweep<S, Precision, Material, K, packed> {
       Weights<K, T> const at = points.weights(g);
       Mat3<T> const before = points.deformation(g);
       Mat3<T> const F = before + this->change_of_F(at, corner, local_x.data(), before);
+      auto const material = this->own(of_patch, patch, g);
       Mat3<T> const P = Material::stress(Material::evaluate(material, F));
       Mat3<T> Z = F, U = (T(1) / k) * P;
       if (!first) {

@@ -164,7 +164,8 @@ int plan_particles(Scene const& scene) {
         "  particles     resist deformation: {}, {:.3g} Pa{}\n", one.model, one.young,
         particles.flows[m].kind == FlowKind::none
             ? ""
-            : fmt::format("; after a step {} takes what they cannot bear",
+            : fmt::format("; {} a step {} takes what they cannot bear",
+                          yields_in_step(one.model, particles.flows[m].kind) ? "in" : "after",
                           plasticity_kinds()[static_cast<std::size_t>(particles.flows[m].kind)]));
   }
   bool const slips = std::any_of(points.boundaries.begin(), points.boundaries.end(),
@@ -221,8 +222,10 @@ int methods_command() {
     fmt::print("  {:<24} {}\n  {:<24} {}\n", model.name, model.description, "",
                model.allows_inversion ? "tolerates inverted elements" : "keeps J > 0");
   }
-  fmt::print("of material points ([grid]): {}; plasticity.kind: {}\n",
-             fmt::join(particle_models(), ", "), fmt::join(plasticity_kinds(), ", "));
+  fmt::print(
+      "of material points ([grid]): {}; plasticity.kind: {}\n"
+      "  hencky_plastic lets von_mises and sand yield in the step, every other model after it\n",
+      fmt::join(particle_models(), ", "), fmt::join(plasticity_kinds(), ", "));
   return 0;
 }
 

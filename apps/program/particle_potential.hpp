@@ -9,6 +9,7 @@
 #include <taut/mpm/particle_grid.hpp>
 #include <taut/mpm/particle_operator.hpp>
 #include <taut/mpm/particle_split.hpp>
+#include <taut/mpm/plastic_flow.hpp>
 #include <taut/mpm/slip.hpp>
 
 #include <algorithm>
@@ -111,8 +112,14 @@ using ParticlePotential = Potential<Inertia<ParticlePrecision>, BodyForce<Partic
 
 /// What ParticleBlocks are to be padded to for them.
 int particle_lanes();
-/// Adds the elastic term of a model (particle_models).
+/// Adds the elastic term of a model (particle_models), the same whatever flows after a step.
 void add_particle_term(ParticleTerms& terms, std::string_view model,
                        std::vector<Lame<double>> const& materials);
+/// Whether this model lets a material yield within the step that flows so after it.
+bool yields_in_step(std::string_view model, FlowKind kind);
+/// Adds the term of a model of which materials yield in the step as their flow does after it.
+void add_particle_term(ParticleTerms& terms, std::string_view model,
+                       std::vector<Lame<double>> const& materials,
+                       std::vector<MaterialFlow> const& flows);
 
 }  // namespace taut

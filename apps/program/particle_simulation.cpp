@@ -267,7 +267,7 @@ private:
       materials.push_back(lame_parameters(m.young, m.poisson));
     }
     ParticleTerms terms;
-    add_particle_term(terms, start.materials.front().model, materials);
+    add_particle_term(terms, start.materials.front().model, materials, start.flows);
     Point const& g = scene_.gravity;
     auto const& unknowns = grid_.unknowns();
     return ParticlePotential(unknowns, Inertia<P>(unknowns),
@@ -286,10 +286,15 @@ private:
     nodes.mass.assign(mass.data(), mass.data() + mass.extent(0));
     return nodes;
   }
-  /// Friction takes its forces from the minimisation before, and what separates is held or let go
-  /// between minimisations: as often as something changes, which is rarely more than twice.
+  /// Friction takes its forces from the minimisation before, sand that yields in the step its
+  /// pressure, and what separates is held or let go between minimisations: as often as something
+  /// changes, which is rarely more than twice.
   Lagging lagging() const {
     int passes = 1;
+    for (std::size_t k = 0; k < start_.flows.size(); ++k) {
+      bool const sand = start_.flows[k].kind == FlowKind::sand;
+      if (sand && yields_in_step(start_.materials[k].model, FlowKind::sand)) passes = 4;
+    }
     for (SceneBoundary const& b : points_.boundaries) {
       if (b.friction > 0) passes = std::max(passes, 2);
       if (b.law == BoundaryLaw::separate) passes = 8;

@@ -7,11 +7,16 @@
 #include <concepts>
 
 namespace taut {
+namespace {
+
+constexpr std::string_view hencky_plastic = "hencky_plastic";
+
+}  // namespace
 
 std::span<std::string_view const> particle_models() {
-  static constexpr std::array<std::string_view, 5> models{FixedCorotated::name, NeoHookean::name,
-                                                          StableNeoHookean::name,
-                                                          StableNeoHookean2018::name, Arap::name};
+  static constexpr std::array<std::string_view, 7> models{
+      FixedCorotated::name, NeoHookean::name, StableNeoHookean::name, StableNeoHookean2018::name,
+      Arap::name,           Hencky::name,     hencky_plastic};
   return models;
 }
 
@@ -28,6 +33,30 @@ void add_particle_term(ParticleTerms& terms, std::string_view model,
     }
     return true;
   });
+}
+
+bool yields_in_step(std::string_view model, FlowKind kind) {
+  return model == hencky_plastic && (kind == FlowKind::von_mises || kind == FlowKind::sand);
+}
+
+void add_particle_term(ParticleTerms& terms, std::string_view model,
+                       std::vector<Lame<double>> const& materials,
+                       std::vector<MaterialFlow> const& flows) {
+  if (model != Hencky::name && model != hencky_plastic) {
+    add_particle_term(terms, model, materials);
+    return;
+  }
+  std::vector<HenckyParameters<double>> all;
+  for (std::size_t k = 0; k < materials.size(); ++k) {
+    if (!yields_in_step(model, flows[k].kind)) {
+      all.push_back(hencky(materials[k]));
+    } else if (flows[k].kind == FlowKind::sand) {
+      all.push_back(hencky(materials[k], flows[k].sand));
+    } else {
+      all.push_back(hencky(materials[k], flows[k].metal));
+    }
+  }
+  add_hencky_late(fmt::format("{} of material points", model), terms, all);
 }
 
 }  // namespace taut

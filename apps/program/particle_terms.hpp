@@ -4,6 +4,7 @@
 
 #include <taut/apps/program/late_part.hpp>
 #include <taut/apps/program/particle_potential.hpp>
+#include <taut/materials/hencky.hpp>
 #include <taut/materials/models.hpp>
 #include <taut/mpm/elastic_particles.hpp>
 
@@ -23,5 +24,8 @@ void add_solid(ParticleTerms& terms, std::vector<Lame<double>> const& materials)
 template <class Model>
 inline constinit LatePart<void(ParticleTerms&, std::vector<Lame<double>> const&)> add_solid_late =
     {};
+/// For Hencky's, with or without plasticity in the step.
+inline constinit LatePart<void(ParticleTerms&, std::vector<HenckyParameters<double>> const&)>
+    add_hencky_late = {};
 
 }  // namespace taut

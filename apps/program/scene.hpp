@@ -139,7 +139,8 @@ struct SceneForce {
   Window window;
 };
 
-/// What takes stresses that a material of points cannot bear away after a step (docs/scenes.md).
+/// What takes stresses that a material of points cannot bear away, after a step or, by the model,
+/// in it (docs/scenes.md).
 struct Plasticity {
   std::string kind = "none";  ///< a name of `plasticity_kinds()`
   double yield_stress = 0;    ///< of the metals, Pa

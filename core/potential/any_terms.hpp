@@ -129,7 +129,7 @@ public:
   void begin_step(StepStart<Precision, Space> const& start) const requires stepped {
     for (auto const& t : terms_) t->begin_step(start);
   }
-  bool relag(Positions const& x) const requires stepped {
+  bool relag(Positions const& x) const {
     bool changed = false;
     for (auto const& t : terms_) changed = t->relag(x) || changed;
     return changed;

@@ -93,7 +93,7 @@ struct StepStart {
 };
 
 /// A term that is told when a step begins. It may then become another function of x, and must not
-/// within the step, unless `advance` or `relag` (below) says so.
+/// within the step, unless `advance` says so, or `relag` as of any term (below).
 template <class Term>
 concept SteppedTerm = SweptTerm<Term> &&
     requires(Term const& term, StepStart<typename Term::Precision, typename Term::Space> start) {
@@ -126,9 +126,10 @@ concept MovingTerm = SweptTerm<Term> &&
 };
 
 /// A term of which something was taken where the step began and stays so (the normal forces of
-/// friction). `relag` takes it at x instead; false if that changes nothing.
+/// friction, the pressure by which sand yields). `relag` takes it at x instead; false if that
+/// changes nothing.
 template <class Term>
-concept LaggedTerm = SteppedTerm<Term> &&
+concept LaggedTerm = SweptTerm<Term> &&
     requires(Term const& term,
              VectorField<typename Term::Precision::position, typename Term::Space> x) {
   { term.relag(x) } -> std::convertible_to<bool>;

@@ -3,6 +3,7 @@
 #pragma once
 
 #include <taut/materials/elastic.hpp>
+#include <taut/mpm/particle_memory.hpp>
 #include <taut/mpm/particles.hpp>
 #include <taut/mpm/spline.hpp>
 
@@ -39,7 +40,8 @@ struct ParticleOracle {
   int width;
   double dx;
   std::vector<Particle> particles;
-  std::vector<Lame<double>> materials;
+  using Parameters = typename Material::template Parameters<double>;
+  std::vector<Parameters> materials;
   std::vector<std::array<int, 3>> nodes;
 
   double weight(Particle const& p, int i) const {
@@ -73,14 +75,24 @@ struct ParticleOracle {
     return u;
   }
   double volume(Particle const& p) const { return p.volume * p.stiffness; }
+  /// With what the particle remembers, where the material takes that; what lags as it is at `lag`.
+  Field lag;
+  Parameters own(Particle const& p) const {
+    Parameters const& m = materials[p.material];
+    if constexpr (RememberingMaterial<Material>) {
+      Mat3<double> const F = lag.empty() ? p.F : p.F + change_of_F(p, displacements(lag));
+      return Material::with(m, Material::remember(m, F, p.plastic));
+    }
+    return m;
+  }
   auto state(Particle const& p, Field const& u) const {
-    return Material::evaluate(materials[p.material], p.F + change_of_F(p, u));
+    return Material::evaluate(own(p), p.F + change_of_F(p, u));
   }
   double value(Field const& x) const {
     Field const u = displacements(x);
     double sum = 0;
     for (Particle const& p : particles) {
-      sum += volume(p) * Material::energy(materials[p.material], p.F + change_of_F(p, u));
+      sum += volume(p) * Material::energy(own(p), p.F + change_of_F(p, u));
     }
     return sum;
   }

@@ -62,6 +62,12 @@ inline double difference(Field const& a, Field const& b) {
   return most;
 }
 
+/// Two materials for a problem.
+template <class Material>
+std::vector<typename Material::template Parameters<double>> two_materials() {
+  return {{1e5, 1.5e5}, {3e6, 1e6}};
+}
+
 template <class C>
 struct Problem {
   using Term = typename C::Term;
@@ -70,7 +76,8 @@ struct Problem {
   using Positions = typename Term::Positions;
   using Vectors = typename Term::Vectors;
 
-  std::vector<Lame<double>> materials{{1e5, 1.5e5}, {3e6, 1e6}};
+  std::vector<typename C::Material::template Parameters<double>> materials =
+      two_materials<typename C::Material>();
   double dx = 0.05;
   std::vector<Particle> list;
   OnGrid<typename C::Kernel, Precision, Space> scene;
@@ -86,7 +93,7 @@ struct Problem {
       : list(jittered_block(cells, per_axis, dx, {-3.3, 5.2, 6.6}, 2)),
         scene(list, dx, Term::lanes, 2),
         term(materials, team_size),
-        oracle{C::Kernel::width, dx, list, materials, scene.places()},
+        oracle{C::Kernel::width, dx, list, materials, scene.places(), {}},
         fixed("fixed", scene.nodes()) {
     term.update(scene.particles, scene.blocks, scene.grid.nodes(), scene.rest);
     std::mt19937 random(3);

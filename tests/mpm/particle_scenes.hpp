@@ -38,6 +38,7 @@ inline std::vector<Particle> jittered_block(int cells, int per_axis, double dx,
         p.stiffness = 1 + 0.2 * jitter();
         p.material = i * materials / n;
         p.object = p.material;
+        p.plastic = 0.01 * ((i + j + k) % 3);
         list.push_back(p);
       }
   return list;

@@ -1,0 +1,15 @@
+#include <taut/apps/program/particle_terms.hpp>
+
+namespace taut {
+namespace {
+
+void add_hencky(ParticleTerms& terms, std::vector<HenckyParameters<double>> const& materials) {
+  using Solid = ElasticParticles<Hencky, ParticleKernel, ParticlePrecision, DefaultSpace>;
+  static_assert(Solid::lanes == ProgramSolid<FixedCorotated>::lanes);
+  terms.add(Solid(materials));
+}
+
+bool const filled = add_hencky_late.fill(add_hencky);
+
+}  // namespace
+}  // namespace taut
