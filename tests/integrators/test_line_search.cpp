@@ -175,7 +175,8 @@ TEST_CASE("a step within what p'Hp has certified is not looked for again, a long
 
 TEST_CASE("an uphill direction is followed backwards, within the same bounds") {
   Setting<toy::Barrier> s(-1);
-  auto const backwards = Setting<toy::Barrier>(1).fields.direction;
+  Setting<toy::Barrier> const downhill(1);  // whose fields live as long as it does
+  auto const& backwards = downhill.fields.direction;
   double const valid = s.chain.max_step(s.x, backwards, toy::infinity);
   SECTION("newton") {
     auto line = s.line();
