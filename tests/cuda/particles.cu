@@ -2,6 +2,7 @@
 #include <taut/core/potential/potential.hpp>
 #include <taut/integrators/ncg.hpp>
 #include <taut/integrators/time_stepper.hpp>
+#include <taut/materials/hencky.hpp>
 #include <taut/materials/models.hpp>
 #include <taut/mpm/elastic_particles.hpp>
 #include <taut/mpm/particle_multigrid.hpp>
@@ -13,6 +14,7 @@ using namespace taut;
 using Points = ElasticParticles<Elastic<StableNeoHookean>>;
 template class taut::ElasticParticles<Elastic<StableNeoHookean>>;
 template class taut::ElasticParticles<Elastic<NeoHookean>, CubicSpline, Fp64>;
+template class taut::ElasticParticles<Hencky>;
 template class taut::Slip<>;
 
 using Stepper = ParticleStepper<ImplicitEuler<Ncg<DaiKou, BlockJacobi>>>;
