@@ -46,6 +46,23 @@ public:
   bool pointwise() const {
     return std::visit([](auto const& m) { return m.pointwise(); }, chosen_);
   }
+  /// A minimisation begins.
+  void start() {
+    std::visit(
+        [](auto& m) {
+          if constexpr (requires { m.start(); }) m.start();
+        },
+        chosen_);
+  }
+  /// Whether the last update made a stronger one than the first.
+  bool strong() const {
+    return std::visit(
+        [](auto const& m) {
+          if constexpr (requires { m.strong(); }) return m.strong();
+          return false;
+        },
+        chosen_);
+  }
   template <class E>
   void update(E& e, VectorField<typename P::position, S> const& x) {
     std::visit([&](auto& m) { m.update(e, x); }, chosen_);

@@ -143,6 +143,7 @@ public:
     fields_.mass = e_.mass();
     rule_.start(scale_);
     direction_.start();
+    if constexpr (requires { preconditioner_.start(); }) preconditioner_.start();
     start_travel();
     position_noise_ = epsilon<typename P::position> * largest_position();
     while (report_.stop == Stop::none) {
@@ -218,6 +219,9 @@ private:
     preconditioner_.update(e_, x_);
     clock_.updated();
     ++report_.refreshes;
+    if constexpr (requires { preconditioner_.strong(); }) {
+      report_.strengthened += preconditioner_.strong();
+    }
     return true;
   }
 

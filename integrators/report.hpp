@@ -62,6 +62,7 @@ struct MinimiserReport {
   int backtracks = 0;        ///< steps tried and refused
   int cuts = 0;              ///< steps cut by a bound
   int refreshes = 0;         ///< updates of the preconditioner
+  int strengthened = 0;      ///< of these, those while it was a stronger one than the first
   double energy_change = 0;  ///< sum over the steps, kg m^2; predicted where nothing measured it
   double error_estimate_m = std::numeric_limits<double>::infinity();    ///< mass-weighted rms, m
   double error_estimate_mps = std::numeric_limits<double>::infinity();  ///< the same over h, m/s
@@ -97,6 +98,7 @@ inline MinimiserReport in_sequence(MinimiserReport const& first, MinimiserReport
   r.backtracks += first.backtracks;
   r.cuts += first.cuts;
   r.refreshes += first.refreshes;
+  r.strengthened += first.strengthened;
   r.energy_change += first.energy_change;
   r.seconds += first.seconds;
   r.islands = std::max(first.islands, second.islands);

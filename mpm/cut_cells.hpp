@@ -16,7 +16,7 @@
 
 #include <taut/core/exec/scan.hpp>
 #include <taut/core/sparse/aggregate_inverse.hpp>
-#include <taut/mpm/level_operator.hpp>
+#include <taut/mpm/exact_block.hpp>
 
 namespace taut {
 
@@ -27,9 +27,6 @@ struct CutCells {
 };
 
 namespace kernels {
-
-template <class S>
-using NodeIndices = Kokkos::View<int*, typename S::memory>;
 
 /// Neighbour k of 27 of a node, or -1.
 template <class S>

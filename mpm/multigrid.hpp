@@ -6,16 +6,18 @@
 //   smooth
 //
 // Every coarser level has the nodes that the finer one is interpolated from, and the matrix P'AP,
-// down to so few nodes that a dense inverse is cheap. What the fine level is (a matrix, or an
-// operator without one), how it hangs on the next, and how levels are smoothed are policies; and
-// where the matrices of the coarser levels come from, if not from P'AP.
+// down to so few nodes that a dense inverse is cheap, or a sparse factor. What the fine level is (a
+// matrix, or an operator without one), how it hangs on the next, and how levels are smoothed are
+// policies; and where the matrices of the coarser levels come from, if not from P'AP.
 #pragma once
 
 #include <taut/core/sparse/dense_inverse.hpp>
+#include <taut/mpm/exact_block.hpp>
 #include <taut/mpm/grid_level.hpp>
 #include <taut/mpm/level_pcg.hpp>
 #include <taut/mpm/smoother.hpp>
 
+#include <algorithm>
 #include <deque>
 #include <vector>
 
@@ -44,6 +46,12 @@ struct SpreadRow {
   }
 };
 
+template <class S>
+struct NumberAll {
+  NodeIndices<S> to;
+  KOKKOS_FUNCTION void operator()(int i) const { to(i) = i; }
+};
+
 /// b = 0 at fixed nodes.
 template <class S, class T>
 struct ClearFixed {
@@ -69,7 +77,7 @@ struct LevelSource {
 /// What a hierarchy has become.
 struct MultigridReport {
   std::vector<int> nodes;  ///< of each level, from the finest
-  bool direct = false;     ///< whether the coarsest level is inverted; else it is smoothed
+  bool direct = false;     ///< whether the coarsest level is solved exactly; else it is smoothed
   double shift = 0;        ///< that the coarsest matrix needed to be positive definite, see
                            ///< invert_positive
   std::size_t memory = 0;  ///< bytes of matrices
@@ -89,6 +97,9 @@ public:
   struct Params {
     int max_levels = 20;    ///< the fine one counted
     int direct_nodes = 60;  ///< the coarsest level may have so many; there is no coarser one then
+    /// Where above direct_nodes: the coarsest level may have so many, and is solved by a sparse
+    /// factor, on the host.
+    int sparse_nodes = 0;
     int visits = 1;         ///< of a coarser level in a cycle: 1 is a V-cycle, 2 a W-cycle
     int coarse_sweeps = 8;  ///< of the coarsest level, where it is not inverted
     /// Above 0, where the coarsest level is not inverted: it is solved by conjugate gradients until
@@ -146,6 +157,8 @@ public:
     for_each<S>("cycle_end", n, kernels::ConvertVectors<S, FineScalar, X>{fine_vectors_.x, z});
   }
 
+  /// Of hierarchies that are built from now on.
+  void set_sparse_nodes(int most) { params_.sparse_nodes = most; }
   MultigridReport const& report() const { return report_; }
   /// Of conjugate gradients on the coarsest level, in all cycles since `build`.
   int coarse_iterations() const { return coarse_count_; }
@@ -190,7 +203,7 @@ private:
   bool add_level(LeafList const& finer, double dx) {
     int const above = report_.nodes.back();
     if (static_cast<int>(report_.nodes.size()) >= params_.max_levels) return false;
-    if (used_ > 0 && above <= params_.direct_nodes) return false;
+    if (used_ > 0 && above <= std::max(params_.direct_nodes, params_.sparse_nodes)) return false;
     if (used_ == levels_.size()) levels_.emplace_back();
     Level& l = levels_[used_];
     if (source_ != nullptr) {
@@ -220,7 +233,9 @@ private:
   void invert_coarsest() {
     MatrixLevel<S, T, radius> const& level = levels_[used_ - 1].level;
     int const n = level.size();
-    report_.direct = n <= params_.direct_nodes;
+    sparse_ = n > params_.direct_nodes && n <= params_.sparse_nodes && factorize_coarsest();
+    report_.direct = sparse_ || n <= params_.direct_nodes;
+    if (sparse_) return;
     if (!report_.direct) {
       grow(levels_[used_ - 1].before, "level_vector", static_cast<std::size_t>(n));
       return;
@@ -234,6 +249,18 @@ private:
     // What rounding the blocks of a row does to its sum: some ten units in the last place.
     report_.shift =
         inverse_.factorize(std::move(numbers), n, 16 * double(std::numeric_limits<T>::epsilon()));
+  }
+
+  /// False if the matrix is not positive definite to the precision of T.
+  bool factorize_coarsest() {
+    MatrixLevel<S, T, radius> const& level = levels_[used_ - 1].level;
+    grow(all_, "coarsest_nodes", static_cast<std::size_t>(level.size()));
+    for_each<S>("coarsest_nodes", level.size(), kernels::NumberAll<S>{all_});
+    bool const positive = exact_.factorize(level.matrix(), all_, level.size(), false,
+                                           16 * double(std::numeric_limits<T>::epsilon()));
+    report_.shift = exact_.shift();
+    report_.memory += exact_.memory();
+    return positive;
   }
 
   bool solves_by_pcg() const {
@@ -304,6 +331,7 @@ private:
   void once(std::size_t l) const {
     Level const& level = levels_[l];
     auto const& v = level.vectors;
+    if (l + 1 == used_ && sparse_) return exact_.solve(v.b, v.x, level.level.size(), false);
     if (l + 1 == used_ && report_.direct) {
       inverse_.apply(v.b, v.x);
       return;
@@ -332,6 +360,9 @@ private:
   std::size_t used_ = 0;
   Source* source_ = nullptr;
   DenseInverse<S> inverse_;
+  bool sparse_ = false;  ///< the coarsest level is solved by exact_
+  ExactBlock<S> exact_;
+  kernels::NodeIndices<S> all_;
   mutable double enough_ = 0;  ///< of this cycle
   mutable int coarse_count_ = 0;
   MultigridReport report_;

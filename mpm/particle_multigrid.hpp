@@ -11,6 +11,7 @@
 #include <taut/core/potential/preconditioning.hpp>
 #include <taut/mpm/cut_cells.hpp>
 #include <taut/mpm/geometric_levels.hpp>
+#include <taut/mpm/light_nodes.hpp>
 #include <taut/mpm/multigrid.hpp>
 #include <taut/mpm/particle_operator.hpp>
 
@@ -29,6 +30,22 @@ struct ParticleCyclePolicies {
   static constexpr bool assembled = assembled_;
 };
 
+/// A stronger cycle where the plain one does not suffice: light nodes are solved with exactly
+/// (light_nodes.hpp), and so is the first coarser level that is not too large. Coarse nodes far
+/// apart in a body, or of bodies that lie side by side, fall together on the levels below it, which
+/// hold stiff parts of it together by soft ones.
+struct Strengthening {
+  /// The update of a minimisation from which on the cycle is a strong one: with 1 always, with 2
+  /// where it did not come to its end while the first was kept; 0: never.
+  int from = 0;
+  double light = 0.1;       ///< what LightNodes takes
+  int most_light = 3000;    ///< nodes; the cycle stays plain where there are more
+  int sparse_nodes = 2000;  ///< of the coarsest level
+  /// Updates that a strong cycle is kept for: it takes some ten times as long to make. A metric
+  /// that is renewed in every iteration is not kept.
+  int keep = 3;
+};
+
 template <class P = Mixed, class S = DefaultSpace, class Policies = ParticleCyclePolicies<>>
 class ParticleMultigrid {
 public:
@@ -44,7 +61,8 @@ public:
 
   struct Params {
     Refresh refresh = Refresh::lagged(8);
-    CutCells cut_cells = {};  ///< where there is no fine matrix
+    CutCells cut_cells = {};           ///< where there is no fine matrix
+    Strengthening strengthening = {};  ///< the same
     /// Coarser levels from the particles by their own kernels instead of P'AP
     /// (geometric_levels.hpp): the baseline, where there is a fine matrix, linear embedding and one
     /// scalar.
@@ -68,11 +86,24 @@ public:
   LocalMatrices<P, S> const& curvature() const { return no_curvature_; }
   bool pointwise() const { return false; }
 
+  /// A minimisation begins.
+  void start() {
+    updates_ = 0;
+    strong_ = false;
+  }
   /// Takes the Hessian at x, and builds the hierarchy.
   template <class E>
   void update(E& e, VectorField<typename P::position, S> const& x) {
+    Strengthening const& strong = params_.strengthening;
+    int const age = ++updates_ - strong.from;
+    if (strong_ && !holds_hessian() && age % strong.keep != 0) return;
     e.linearise(x, operator_, local_);
     operator_.set_local(local_, e.fixed());
+    if constexpr (!assembled) {
+      strong_ =
+          strong.from > 0 && age >= 0 && light_.build(operator_, strong.light, strong.most_light);
+      cycle_.set_sparse_nodes(strong_ ? strong.sparse_nodes : params_.cycle.sparse_nodes);
+    }
     if constexpr (assembled) {
       fine_.resize(operator_.nodes(), operator_.fixed());
       operator_.matrix(fine_.matrix());
@@ -93,12 +124,21 @@ public:
   }
 
   /// z = P g. Allocates nothing.
-  void apply(Vectors const& g, Vectors const& z) const { cycle_.apply(g, z); }
+  void apply(Vectors const& g, Vectors const& z) const {
+    if (!strong_) return cycle_.apply(g, z);
+    light_.apply(
+        g, z, [&](Vectors const& x, Vectors const& y) { operator_.product(x, y); },
+        [&](Vectors const& r, Vectors const& x) { cycle_.apply(r, x); });
+  }
 
   bool holds_hessian() const { return params_.refresh.interval == 1; }
   void hessian_product(Vectors const& d, Vectors const& hd) const { fine_.product(d, hd); }
 
   MultigridReport const& report() const { return cycle_.report(); }
+  /// Whether the last update has strengthened the cycle.
+  bool strong() const { return strong_; }
+  /// Nodes that the last cycle solves with exactly.
+  int light_nodes() const { return strong_ ? light_.nodes() : 0; }
   Cycle const& cycle() const { return cycle_; }
   Fine const& fine() const { return fine_; }
   Operator const& hessian() const { return operator_; }
@@ -117,6 +157,9 @@ private:
   Operator operator_;
   Fine fine_;
   Cycle cycle_;
+  LightNodes<S, Real, Kernel::width - 1> light_;
+  int updates_ = 0;  ///< of this minimisation
+  bool strong_ = false;
 };
 
 }  // namespace taut

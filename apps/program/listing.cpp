@@ -190,6 +190,14 @@ int plan_particles(Scene const& scene) {
     }
   }
   fmt::print("  metric        evens out stiffness and mass: {}\n", particle_preconditioner(solver));
+  if (particle_preconditioner(solver) == "multigrid") {
+    std::string const& strong = solver.text("strong_cycle");
+    fmt::print("                {}\n",
+               strong == "auto" ? "in steps that it has not ended after 400 iterations, a stronger "
+                                  "one: exact at light nodes and on a coarser level"
+               : strong == "always" ? "exact at light nodes and on a coarser level"
+                                    : "the same however long a step takes");
+  }
   fmt::print("  curvature     is projected exactly, particle by particle\n");
   fmt::print("  line search   says how far to go: {}\n", solver.text("line_search"));
   fmt::print("  stop          {}: {}; at most {} iterations\n", solver.text("stopping"),

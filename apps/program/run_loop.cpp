@@ -198,6 +198,7 @@ void RunLoop::take_step() {
       .set("backtracks", r.backtracks)
       .set("cuts", r.cuts)
       .set("refreshes", r.refreshes)
+      .set("strengthened", r.strengthened)
       .set("islands", r.islands)
       .set("left", r.left)
       .set("woken", r.woken)

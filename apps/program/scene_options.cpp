@@ -86,6 +86,14 @@ std::span<OptionKey const> solver_keys() {
        "of their coarsest level, of three: PCG to half of the unsmoothed right-hand side (auto) or "
        "of its own; or smoothing; direct: levels down to 60 nodes, which are inverted"},
       {"cycle", std::string("v"), {}, {"v", "w"}, "of multigrid"},
+      {"strong_cycle",
+       std::string("auto"),
+       {},
+       {"auto", "always", "never"},
+       "of multigrid of material points, which then also solves exactly with nodes that hardly any "
+       "particle sees, and with the first coarser level of at most 2000 nodes, where no more than "
+       "3000 of the former are; auto: from the "
+       "51st renewal in a step on, which is after 400 iterations"},
       {"forget",
        false,
        {},

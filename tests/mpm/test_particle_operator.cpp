@@ -8,6 +8,8 @@
 namespace taut {
 namespace {
 
+using kernels::vector_of;
+
 template <class Precision, class Space, bool packed>
 using Of =
     test::Combination<FixedCorotated, FullProjection, QuadraticSpline, Precision, Space, packed>;
@@ -280,6 +282,80 @@ TEST_CASE("cut cells are solved with by patches", "[mpm][operator]") {
     }
   }
   CHECK(apart(level.preconditioned(r), expected, l.n) < 1e-9);
+}
+
+TEST_CASE("light nodes are solved with exactly, around a cycle", "[mpm][operator]") {
+  using C = Of<Fp64, test::RightOf<DefaultSpace>, true>;
+  using S = C::Space;
+  using Vectors = VectorField<double, S>;
+  Linearised<C> const l;
+  auto const level = l.matrix();
+  GridNodes<S> const& nodes = l.to.nodes();
+  double const ratio = 0.05;
+  LightNodes<S, double, 2> light;
+  CHECK_FALSE(light.build(l.to, ratio, 3));
+  CHECK(light.nodes() == 0);
+  REQUIRE(light.build(l.to, ratio, l.n));
+
+  // Which they are, from the diagonal of the matrix.
+  auto const trace_of = [&](int i) {
+    return contract(level.matrix().block(i, 0, 0, 0), identity3<double>());
+  };
+  std::vector<int> is_light(l.n, 0);
+  int count = 0;
+  for (int i = 0; i < l.n; ++i) {
+    double most = 0;
+    for (int k = 0; k < 27; ++k) {
+      int const j = nodes.node(nodes.ijk(i, 0) + k / 9 - 1, nodes.ijk(i, 1) + k / 3 % 3 - 1,
+                               nodes.ijk(i, 2) + k % 3 - 1);
+      if (j >= 0 && !l.problem.fixed(j)) most = std::max(most, trace_of(j));
+    }
+    is_light[i] = !l.problem.fixed(i) && trace_of(i) < ratio * most;
+    count += is_light[i];
+  }
+  REQUIRE(count > 10);
+  REQUIRE(count < l.n / 2);
+  CHECK(light.nodes() == count);
+
+  auto const product = [&](Vectors const& x, Vectors const& y) { level.product(x, y); };
+  auto const cycle = [&](Vectors const& r, Vectors const& z) {
+    for (int i = 0; i < l.n; ++i) {
+      auto const own = kernels::block_times<double>(level.inverse(), i, vector_of<double>(r, i));
+      for (int c = 0; c < 3; ++c) z(i, c) = 0.1 * own[c];
+    }
+  };
+  auto const dot = [&](Vectors const& a, Vectors const& b) {
+    double sum = 0;
+    for (int i = 0; i < l.n; ++i)
+      for (int c = 0; c < 3; ++c) sum += a(i, c) * b(i, c);
+    return sum;
+  };
+  auto const a = l.vectors(), b = l.vectors(), of_a = l.vectors(), of_b = l.vectors(),
+             left = l.vectors();
+  for (int i = 0; i < l.n; ++i)
+    for (int c = 0; c < 3; ++c) {
+      a(i, c) = l.problem.fixed(i) ? 0 : std::sin(2.0 * i + c);
+      b(i, c) = l.problem.fixed(i) ? 0 : std::cos(3.0 * i - c);
+    }
+  light.apply(a, of_a, product, cycle);
+  light.apply(b, of_b, product, cycle);
+  CHECK(std::abs(dot(of_a, b) - dot(a, of_b)) < 1e-12 * std::abs(dot(a, of_a)));
+  CHECK(dot(a, of_a) > 0);
+  // Last comes the exact solve, so nothing is left at light nodes.
+  level.product(of_a, left);
+  double rest = 0, all = 0;
+  for (int i = 0; i < l.n; ++i)
+    for (int c = 0; c < 3; ++c) {
+      if (is_light[i]) rest = std::max(rest, std::abs(a(i, c) - left(i, c)));
+      all = std::max(all, std::abs(a(i, c)));
+    }
+  CHECK(rest < 1e-10 * all);
+  // What light nodes alone have done is undone at once.
+  for (int i = 0; i < l.n; ++i)
+    for (int c = 0; c < 3; ++c) a(i, c) = is_light[i] ? std::sin(2.0 * i + c) : 0;
+  level.product(a, b);
+  light.apply(b, of_b, product, cycle);
+  CHECK(apart(of_b, a, l.n) < 1e-9);
 }
 
 TEST_CASE("matrices of particles do not depend on the number of threads", "[mpm][operator]") {
