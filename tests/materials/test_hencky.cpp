@@ -19,7 +19,7 @@ using Parameters = HenckyParameters<double>;
 
 static_assert(ElementMaterial<Hencky>);
 
-Lame<double> const lame = lame_parameters(2e5, 0.3);
+Lame<double> const solid = lame_parameters(2e5, 0.3);
 
 Mat3<double> diagonal(double a, double b, double c) { return {{a, 0, 0, 0, b, 0, 0, 0, c}}; }
 
@@ -38,10 +38,10 @@ struct Sample {
 /// the second derivative at yield and where sand opens.
 std::vector<Sample> samples() {
   std::mt19937 random(4);
-  Parameters const elastic = hencky(lame);
-  Parameters const perfect = hencky(lame, VonMises{lame.mu, 4e3});
-  Parameters const hardens = hencky(lame, VonMises{lame.mu, 4e3, 5e4});
-  Parameters const sand = hencky(lame, DruckerPrager{lame.mu, lame.lambda, 30});
+  Parameters const elastic = hencky(solid);
+  Parameters const perfect = hencky(solid, VonMises{solid.mu, 4e3});
+  Parameters const hardens = hencky(solid, VonMises{solid.mu, 4e3, 5e4});
+  Parameters const sand = hencky(solid, DruckerPrager{solid.mu, solid.lambda, 30});
   double const r = perfect.yield;
   std::vector<Sample> all;
   for (auto const& [name, p] : {std::pair{"elastic", elastic}, std::pair{"perfect", of(perfect, r)},
@@ -125,7 +125,7 @@ TEST_CASE("the change of Hencky's energy is as exact for small steps as for larg
 
 TEST_CASE("the stress is continuous where a material begins to yield", "[hencky]") {
   std::mt19937 random(5);
-  Parameters const metal = hencky(lame, VonMises{lame.mu, 4e3, 2e4});
+  Parameters const metal = hencky(solid, VonMises{solid.mu, 4e3, 2e4});
   Mat3<double> const F = with_stretches(random, 1.1, 1.0, 0.95);
   double const size = Hencky::evaluate(metal, F).size;
   auto const just = [&](double factor) { return of(metal, factor * size); };
@@ -146,25 +146,25 @@ TEST_CASE("the stress of a trial is the elastic stress after the return map", "[
   for (int k = 0; k < 60; ++k) {
     Mat3<double> const F = with_stretches(random, std::exp(normal(random)),
                                           std::exp(normal(random)), std::exp(normal(random)));
-    VonMises const metal{lame.mu, 2e4, 3e4};
+    VonMises const metal{solid.mu, 2e4, 3e4};
     double const strain = 0.1 * (k % 3);
     VonMises::State<double> state{strain};
     Returned<double> const mapped = metal.map(F, state);
     yielded += mapped.yielded;
-    Parameters const p = hencky(lame, metal);
+    Parameters const p = hencky(solid, metal);
     Mat3<double> const tau =
         kirchhoff(Hencky::with(p, Hencky::remember(p, identity3<double>(), strain)), F);
-    CHECK_THAT(frobenius(tau - kirchhoff(hencky(lame), mapped.F)), WithinAbs(0, 1e-10 * 2e5));
+    CHECK_THAT(frobenius(tau - kirchhoff(hencky(solid), mapped.F)), WithinAbs(0, 1e-10 * 2e5));
 
     // Sand, with its pressure at the trial itself: where passes end.
-    DruckerPrager const sand{lame.mu, lame.lambda, 35};
+    DruckerPrager const sand{solid.mu, solid.lambda, 35};
     double const gained = 0.05 * (k % 2);
     DruckerPrager::State<double> volume{0, gained};
     Returned<double> const ground = sand.map(F, volume);
-    Parameters const q = hencky(lame, sand);
+    Parameters const q = hencky(solid, sand);
     YieldMemory<double> const now = Hencky::remember(q, F, gained);
     Mat3<double> const borne = kirchhoff(Hencky::with(q, now), F);
-    CHECK_THAT(frobenius(borne - kirchhoff(hencky(lame), ground.F)), WithinAbs(0, 1e-10 * 2e5));
+    CHECK_THAT(frobenius(borne - kirchhoff(hencky(solid), ground.F)), WithinAbs(0, 1e-10 * 2e5));
     opened += now.limit == 0;
     if (now.limit == 0) CHECK(frobenius(borne) == 0);
   }
@@ -177,14 +177,14 @@ TEST_CASE("sheared metal bears the yield stress over the root of three", "[henck
   // Pure shear e = (g, 0, -g): tau_1 = -tau_3 = 2 mu g up to sigma_Y / sqrt 3, and with hardening
   // mu (e_1 - a sqrt(3)/2) = (sigma_Y + H a) / (2 sqrt 3) from there on.
   double const yield = 4e3, hardening = GENERATE(0.0, 5e4);
-  VonMises const metal{lame.mu, yield, hardening};
-  Parameters const p = of(hencky(lame, metal), hencky(lame, metal).yield);
-  double const root = std::sqrt(3.0), at_yield = yield / (2 * root * lame.mu);
+  VonMises const metal{solid.mu, yield, hardening};
+  Parameters const p = of(hencky(solid, metal), hencky(solid, metal).yield);
+  double const root = std::sqrt(3.0), at_yield = yield / (2 * root * solid.mu);
   for (double g : {0.5 * at_yield, 0.99 * at_yield, 1.01 * at_yield, 0.1, 0.5}) {
     Mat3<double> const tau = kirchhoff(p, diagonal(std::exp(g), 1, std::exp(-g)));
     double const a =
-        g < at_yield ? 0 : (2 * root * lame.mu * g - yield) / (3 * lame.mu + hardening);
-    double const expected = g < at_yield ? 2 * lame.mu * g : (yield + hardening * a) / root;
+        g < at_yield ? 0 : (2 * root * solid.mu * g - yield) / (3 * solid.mu + hardening);
+    double const expected = g < at_yield ? 2 * solid.mu * g : (yield + hardening * a) / root;
     CHECK_THAT(tau(0, 0), WithinRel(expected, 1e-12));
     CHECK_THAT(tau(2, 2), WithinRel(-expected, 1e-12));
     CHECK_THAT(tau(1, 1), WithinAbs(0, 1e-9 * yield));
@@ -194,8 +194,8 @@ TEST_CASE("sheared metal bears the yield stress over the root of three", "[henck
 TEST_CASE("a pulled bar follows its hardening curve", "[hencky]") {
   // Uniaxial stress tau = sigma_Y + H a at the strain e = tau / E + a, across -nu tau / E - a / 2.
   double const young = 2e5, poisson = 0.3;
-  VonMises const metal{lame.mu, 4e3, 5e4};
-  Parameters const p = of(hencky(lame, metal), hencky(lame, metal).yield);
+  VonMises const metal{solid.mu, 4e3, 5e4};
+  Parameters const p = of(hencky(solid, metal), hencky(solid, metal).yield);
   for (double a : {1e-4, 0.01, 0.2}) {
     double const stress = metal.yield_stress + metal.hardening * a;
     double const along = std::exp(stress / young + a),
@@ -214,9 +214,9 @@ TEST_CASE("a pulled bar follows its hardening curve", "[hencky]") {
 TEST_CASE("no flow makes less of a trial than the energy says", "[hencky]") {
   // Elastic energy behind a plastic increment D (traceless, along the principal axes), what D
   // dissipates, and what goes into hardening.
-  VonMises const metal{lame.mu, 4e3, 5e4};
+  VonMises const metal{solid.mu, 4e3, 5e4};
   double const before = 0.05;
-  Parameters const p = hencky(lame, metal);
+  Parameters const p = hencky(solid, metal);
   Parameters const point = Hencky::with(p, Hencky::remember(p, identity3<double>(), before));
   std::mt19937 random(1);
   std::normal_distribution<double> normal(0, 1);
@@ -226,7 +226,7 @@ TEST_CASE("no flow makes less of a trial than the energy says", "[hencky]") {
     double const a = std::sqrt(2.0 / 3) * norm(D);
     Mat3<double> const rest =
         diagonal(std::exp(e[0] - D[0]), std::exp(e[1] - D[1]), std::exp(e[2] - D[2]));
-    return Hencky::energy(hencky(lame), rest) +
+    return Hencky::energy(hencky(solid), rest) +
            (metal.yield_stress + metal.hardening * before) * a + 0.5 * metal.hardening * a * a;
   };
   double const least = Hencky::energy(point, F);
