@@ -327,7 +327,8 @@ struct SettleAnchors {
       double const from = anchors.at.from(v, c), path = anchors.at.path(v, c);
       anchors.at.from(v, c) = from + s * path;
       anchors.at.path(v, c) = 0;
-      error += 2 * Kokkos::Experimental::epsilon_v<double> * (Kokkos::abs(from) + Kokkos::abs(path));
+      error +=
+          2 * Kokkos::Experimental::epsilon_v<double> * (Kokkos::abs(from) + Kokkos::abs(path));
     }
     anchors.radius(v) -= error;
   }

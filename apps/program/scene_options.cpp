@@ -138,7 +138,8 @@ std::span<OptionKey const> solver_keys() {
        false,
        {},
        {},
-       "nonlinear CG, instead of islands: what contact acts on has a direction weight and a step of "
+       "nonlinear CG, instead of islands: what contact acts on has a direction weight and a step "
+       "of "
        "its own, and what is free has others"},
       {"sleep_speed",
        0.0,
