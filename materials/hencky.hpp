@@ -125,12 +125,8 @@ KOKKOS_FORCEINLINE_FUNCTION SingularFrame<T> hencky_frame(HenckyState<T> const& 
     T const quotient =
         select(near, series, T(0.5) * (state.d[i] - state.d[j]) / select(near, T(1), x));
     frame.flip[k] = (state.secant * quotient - T(0.5) * (tau[i] + tau[j])) * per_minor;
-    if constexpr (project) {
-      frame.flip[k] = max(frame.flip[k], T(0));
-      frame.twist[k] = max(frame.twist[k], T(0));
-    }
   }
-  if constexpr (project) frame.scaling = project_psd(frame.scaling);
+  if constexpr (project) frame.project();
   return frame;
 }
 

@@ -22,6 +22,15 @@ struct SingularFrame {
   Vec3<T> twist;    ///< eigenvalue of the pair opposite to index k, projected
   Vec3<T> flip;
 
+  /// Makes negative eigenvalues zero.
+  KOKKOS_FORCEINLINE_FUNCTION void project() {
+    for (int k = 0; k < 3; ++k) {
+      flip[k] = max(flip[k], T(0));
+      twist[k] = max(twist[k], T(0));
+    }
+    scaling = project_psd(scaling);
+  }
+
   /// dP = H : dF with the projected H.
   KOKKOS_FORCEINLINE_FUNCTION Mat3<T> apply(Mat3<T> const& dF) const {
     Mat3<T> const M = transpose_times(U, dF) * V;
@@ -95,12 +104,8 @@ KOKKOS_FORCEINLINE_FUNCTION SingularFrame<T> singular_frame(IsotropicState<Model
       frame.scaling.s[k] = frame.scaling.s[k] + T(4) * d.d22 * s[k] * s[k];
       frame.scaling.s[off[k]] = frame.scaling.s[off[k]] + T(4) * d.d22 * minor;
     }
-    if constexpr (project) {
-      frame.flip[k] = max(frame.flip[k], T(0));
-      frame.twist[k] = max(frame.twist[k], T(0));
-    }
   }
-  if constexpr (project) frame.scaling = project_psd(frame.scaling);
+  if constexpr (project) frame.project();
   return frame;
 }
 

@@ -43,6 +43,7 @@ int hand_over(std::string const& program, char** argv, std::string const& what) 
 }
 
 int ending_in_words(std::function<int()> const& command) {
+  constexpr char const* out_of_memory = "out of memory: lower the resolution, or use fewer objects";
   try {
     return command();
   } catch (LeftToTheWhole const&) {
@@ -50,16 +51,12 @@ int ending_in_words(std::function<int()> const& command) {
   } catch (Error const& error) {
     fmt::print(stderr, "taut: {}\n", error.what());
   } catch (std::bad_alloc const&) {
-    fmt::print(stderr, "taut: out of memory: lower the resolution, or use fewer objects\n");
+    fmt::print(stderr, "taut: {}\n", out_of_memory);
   } catch (std::exception const& error) {
     // Kokkos has no type of its own for what it could not allocate.
     std::string_view const words = error.what();
     bool const memory = words.find("failed to allocate") != words.npos;
-    fmt::print(stderr, "taut: {}{}\n",
-               memory ? "out of memory: lower the resolution, or use fewer "
-                        "objects: "
-                      : "",
-               words);
+    fmt::print(stderr, "taut: {}{}{}\n", memory ? out_of_memory : "", memory ? ": " : "", words);
   }
   return 1;
 }

@@ -3,8 +3,7 @@
 #include <taut/core/fem/mesh_check.hpp>
 #include <taut/core/io/mesh_reader.hpp>
 #include <taut/core/report/error.hpp>
-
-#include <fmt/format.h>
+#include <taut/core/report/first_few.hpp>
 
 #include <algorithm>
 #include <cmath>
@@ -102,21 +101,15 @@ void warn_of_locking(SceneObject const& object, ObjectPart const& part, std::siz
   for (std::size_t m = first; m < geometry.materials.size(); ++m) {
     double const poisson = geometry.materials[m].poisson;
     if (!(poisson > 0.49)) continue;
-    constexpr std::size_t shown = 6;
-    std::vector<std::int32_t> examples;
-    std::int32_t count = 0;
+    std::vector<std::int32_t> locking;
     for (std::int32_t t = 0; t < part.tets; ++t) {
-      if (geometry.material_of_tet[static_cast<std::size_t>(part.first_tet + t)] !=
-          static_cast<std::int32_t>(m))
-        continue;
-      ++count;
-      if (examples.size() < shown) examples.push_back(t);
+      std::size_t const tet = static_cast<std::size_t>(part.first_tet + t);
+      if (geometry.material_of_tet[tet] == static_cast<std::int32_t>(m)) locking.push_back(t);
     }
     geometry.warnings.push_back(fmt::format(
-        "{}: {} of {} tets ({}{}) have a poisson of {}: linear tetrahedra lock above 0.49 and "
-        "deform too little",
-        object.where, count, part.tets, fmt::join(examples, ", "),
-        static_cast<std::size_t>(count) > shown ? ", ..." : "", poisson));
+        "{}: {} of {} tets ({}) have a poisson of {}: linear tetrahedra lock above 0.49 and deform "
+        "too little",
+        object.where, locking.size(), part.tets, first_few(locking, 6), poisson));
   }
 }
 

@@ -92,8 +92,8 @@ std::span<OptionKey const> solver_keys() {
        {"auto", "always", "never"},
        "of multigrid of material points, which then also solves exactly with nodes that hardly any "
        "particle sees, and with the first coarser level of at most 2000 nodes, where no more than "
-       "3000 of the former are; auto: from the "
-       "51st renewal in a step on, which is after 400 iterations"},
+       "3000 of the former are; auto: from the 51st renewal in a step on, which is after 400 "
+       "iterations"},
       {"forget",
        false,
        {},
@@ -139,8 +139,7 @@ std::span<OptionKey const> solver_keys() {
        {},
        {},
        "nonlinear CG, instead of islands: what contact acts on has a direction weight and a step "
-       "of "
-       "its own, and what is free has others"},
+       "of its own, and what is free has others"},
       {"sleep_speed",
        0.0,
        {.min = 0, .max = 1e9, .unit = "m/s"},

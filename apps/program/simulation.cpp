@@ -1,4 +1,5 @@
 #include <taut/apps/program/simulation_impl.hpp>
+#include <taut/core/report/first_few.hpp>
 
 namespace taut {
 
@@ -15,13 +16,7 @@ std::vector<std::int32_t> inverted_tets(TetMesh const& rest, std::vector<Point> 
   return inverted;
 }
 
-std::string first_tets(std::vector<std::int32_t> const& tets) {
-  std::string text;
-  for (std::size_t k = 0; k < tets.size() && k < 5; ++k) {
-    text += fmt::format("{}{}", k == 0 ? "" : ", ", tets[k]);
-  }
-  return tets.size() > 5 ? text + ", ..." : text;
-}
+std::string first_tets(std::vector<std::int32_t> const& tets) { return first_few(tets, 5); }
 
 std::unique_ptr<Simulation> Simulation::create(Scene const& scene, SceneGeometry const& geometry) {
   std::string const& precision = scene.solver.text("precision");

@@ -2,9 +2,9 @@
 
 #include <algorithm>
 #include <cmath>
-#include <span>
 #include <taut/core/fem/mesh_check.hpp>
 #include <taut/core/report/error.hpp>
+#include <taut/core/report/first_few.hpp>
 #include <utility>
 
 namespace taut {
@@ -41,9 +41,8 @@ std::array<double, 6> squared_edges(TetMesh const& mesh, Tet const& tet) {
 std::string named(std::vector<std::size_t> const& elements, std::string_view noun,
                   std::string_view plural) {
   constexpr std::size_t shown = 6;
-  const auto first = std::span(elements).first(std::min(shown, elements.size()));
-  return fmt::format("{} {} ({}{})", elements.size(), elements.size() == 1 ? noun : plural,
-                     fmt::join(first, ", "), elements.size() > shown ? ", ..." : "");
+  return fmt::format("{} {} ({})", elements.size(), elements.size() == 1 ? noun : plural,
+                     first_few(elements, shown));
 }
 
 std::string tets(std::vector<std::size_t> const& elements) {

@@ -113,8 +113,7 @@ TetMesh read_tet_mesh(std::filesystem::path const& path) {
   if (extension == ".obj") {
     throw Error(
         "{}: an OBJ file holds a surface, and tets are needed here; fill it by a mesh generator "
-        "and "
-        "give its .msh, or its .node and .ele.",
+        "and give its .msh, or its .node and .ele.",
         path.string());
   }
 
