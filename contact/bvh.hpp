@@ -176,21 +176,35 @@ public:
     KOKKOS_FUNCTION void visit(SearchBox const& query, SizeClass least, Visitor&& visitor) const {
       visit_bundles(query, least, One<std::remove_reference_t<Visitor>>{*this, visitor});
     }
-    /// Goes down with the box around the group; what this meets is compared with all of the group.
+    /// Goes down with the box around as many of the group as lie together; what this meets is
+    /// compared with all of them.
     template <class Visitor>
     KOKKOS_FUNCTION void visit_group(QueryGroup const& group, Visitor&& visitor) const {
-      kernels::BoxBundle queries;
-      SizeClass least = largest_class;
-      for (int a = 0; a < width; ++a) {
-        queries.set(a, a < group.count ? group.box[a] : empty_box(), 0);
-        if (a < group.count) least = Kokkos::min(least, group.least[a]);
+      for (int first = 0, end = 0; first < group.count; first = end) {
+        SearchBox around = group.box[first];
+        SizeClass least = group.least[first];
+        float side = longest_side(around);
+        for (end = first + 1; end < group.count; ++end) {
+          SearchBox const more = join(around, group.box[end]);
+          float const larger = Kokkos::max(side, longest_side(group.box[end]));
+          if (longest_side(more) > together * larger) break;
+          around = more;
+          side = larger;
+          least = Kokkos::min(least, group.least[end]);
+        }
+        kernels::BoxBundle queries;
+        for (int a = 0; a < width; ++a) {
+          queries.set(a, first <= a && a < end ? group.box[a] : empty_box(), 0);
+        }
+        visit_bundles(around, least,
+                      Group<std::remove_reference_t<Visitor>>{*this, queries, visitor});
       }
-      visit_bundles(queries.all(), least,
-                    Group<std::remove_reference_t<Visitor>>{*this, queries, visitor});
     }
 
   private:
     static constexpr int width = kernels::BoxBundle::size;
+    /// Boxes lie together if the one around them is no more than this times as long as one of them.
+    static constexpr float together = 4;
     KOKKOS_FUNCTION int partner(int g, int b) const { return order(width * g + b); }
 
     template <class Visitor>

@@ -6,6 +6,7 @@
 #include <taut/core/fem/patches.hpp>
 #include <taut/core/fem/tet_mesh.hpp>
 
+#include <algorithm>
 #include <array>
 #include <span>
 #include <string>
@@ -71,7 +72,11 @@ template <class S>
 SurfaceViews<S> copy_surface(Surface const& surface) {
   std::vector<int> edge, triangle;
   for (Edge const& e : surface.edges) edge.insert(edge.end(), e.begin(), e.end());
-  for (Triangle const& t : surface.triangles) triangle.insert(triangle.end(), t.begin(), t.end());
+  std::vector<Triangle> sorted = surface.triangles;
+  std::stable_sort(sorted.begin(), sorted.end(), [](Triangle const& a, Triangle const& b) {
+    return *std::min_element(a.begin(), a.end()) < *std::min_element(b.begin(), b.end());
+  });
+  for (Triangle const& t : sorted) triangle.insert(triangle.end(), t.begin(), t.end());
   return {to_space<S>("surface_vertex", surface.vertices), to_space<S>("surface_edge", edge),
           to_space<S>("surface_triangle", triangle), to_space<S>("surface_object", surface.object)};
 }

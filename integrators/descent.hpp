@@ -33,6 +33,7 @@ struct Heading {
   bool lost = false;        ///< the past had to be forgotten (s'y <= 0)
   bool skipped = false;     ///< the last step taught nothing (s'y too small); the past is kept
   bool solved = false;      ///< p = -H^-1 g, as far as it was asked for
+  bool goes_on = false;     ///< the last p once more: only its slope is new
   bool shortened = false;   ///< p is not all that the method would go for: no measure of the error
 };
 
@@ -72,6 +73,9 @@ private:
 struct Safeguard {
   bool on = true;
   double least_descent = 1e-3;  ///< p descends if g'p <= -least_descent times Heading::descent
+  /// Nonlinear CG goes on along p where a step leaves more than this of its slope,
+  double still_steep = 0.7;
+  double stretch = 10;  ///< by up to so many times the step.
 };
 
 /// Stalled if what remains is round-off, which the line search lets pass: over a window as long as
@@ -229,6 +233,7 @@ private:
     Heading const heading = direction_.next(e_, x_, fields_, preconditioner_, step_, renewed);
     report_.restarts.curvature += heading.lost;
     report_.skipped_pairs += heading.skipped;
+    report_.extended += heading.goes_on;
     bool const descends = heading.slope <= -safeguard_.least_descent * heading.descent;
     if (!safeguard_.on || heading.steepest || descends) return heading;
     ++report_.restarts.not_descent;

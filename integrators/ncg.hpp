@@ -2,6 +2,11 @@
 //   p = -P g + beta p + gamma P y,   x <- x + alpha p,
 // with any beta, preconditioner, line search and stopping rule. Two passes over the unknowns per
 // iteration: one for all scalar products, one for the direction.
+//
+// The curvature that alpha is made from is filtered, so that it is positive: where elements buckle
+// it can be a hundred times what the energy has along p. Steps are short there, the next gradient
+// is much like the last, and beta near or above 1. Such a step goes on along the same p instead, as
+// far as the slopes at both its ends say.
 #pragma once
 
 #include <taut/integrators/beta.hpp>
@@ -126,6 +131,7 @@ public:
     dots_.g1_g1 = double(sums[Dot::g_g]);
     dots_.alpha = last.length;
 
+    if (still_steep(last)) return go_on(last, double(sums[Dot::g_Minv_g]));
     Heading heading;
     Coefficients kept;
     if (!restarted_) {
@@ -148,16 +154,38 @@ public:
                typename P::real(kept.gamma)});
     dots_.g_p = heading.slope = double(products[Update::g_p]);
     dots_.p_p = double(products[Update::p_p]);
-    heading.metric = double(products[Update::p_M_p]);
+    heading.metric = metric_ = double(products[Update::p_M_p]);
     return heading;
   }
 
 private:
+  /// Whether the energy falls on along p, at the end of the last step, nearly as it did at its
+  /// beginning (Wolfe's curvature condition does not hold).
+  bool still_steep(Step const& last) const {
+    bool const whole = last.evaluated && !last.cut && last.backtracks == 0 && last.length > 0;
+    return safeguard_.on && !restarted_ && whole && dots_.g1_p < safeguard_.still_steep * dots_.g_p;
+  }
+  /// The same p again, as far as the change of the slope along it says that its minimum is.
+  Heading go_on(Step const& last, double gradient) {
+    double const curvature = dots_.y_p / last.length, farthest = safeguard_.stretch * last.length;
+    Heading heading;
+    heading.goes_on = true;
+    heading.slope = dots_.g_p = dots_.g1_p;
+    heading.descent = -heading.slope;
+    heading.metric = metric_;
+    heading.gradient = gradient;
+    heading.beta = 1;
+    heading.first_length =
+        curvature * farthest > -heading.slope ? -heading.slope / curvature : farthest;
+    return heading;
+  }
+
   B beta_;
   Safeguard safeguard_;
   bool by_regions_;
   bool restarted_ = true, two_regions_ = false;
   Dots dots_;
+  double metric_ = 0;  ///< p'M p
   Vectors z_, z_before_;
   Resizable<Vectors> z_memory_, z_before_memory_;
   Islands<P, S> islands_;

@@ -60,6 +60,7 @@ struct MinimiserReport {
   Restarts restarts;
   int skipped_pairs = 0;     ///< steps that L-BFGS could not learn from (s'y too small)
   int backtracks = 0;        ///< steps tried and refused
+  int extended = 0;          ///< steps that went on along the direction of the one before
   int cuts = 0;              ///< steps cut by a bound
   int refreshes = 0;         ///< updates of the preconditioner
   int strengthened = 0;      ///< of these, those while it was a stronger one than the first
@@ -96,6 +97,7 @@ inline MinimiserReport in_sequence(MinimiserReport const& first, MinimiserReport
   r.restarts.prescribed += first.restarts.prescribed;
   r.skipped_pairs += first.skipped_pairs;
   r.backtracks += first.backtracks;
+  r.extended += first.extended;
   r.cuts += first.cuts;
   r.refreshes += first.refreshes;
   r.strengthened += first.strengthened;

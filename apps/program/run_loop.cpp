@@ -196,6 +196,7 @@ void RunLoop::take_step() {
                            .set("armijo", r.restarts.armijo)
                            .set("prescribed", r.restarts.prescribed))
       .set("backtracks", r.backtracks)
+      .set("extended", r.extended)
       .set("cuts", r.cuts)
       .set("refreshes", r.refreshes)
       .set("strengthened", r.strengthened)

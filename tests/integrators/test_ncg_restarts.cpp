@@ -5,6 +5,7 @@
 
 #include <catch2/catch_test_macros.hpp>
 
+#include <cmath>
 #include <limits>
 #include <vector>
 
@@ -34,6 +35,22 @@ struct Stubborn : toy::Chain<toy::Anisotropic> {
     double const change = Chain::gradient_after(x, p, alpha, g, curvature...);
     int const k = evaluations++ - from;
     return k >= 0 && k < count ? 1e9 : change;
+  }
+};
+
+/// Claims to be a hundred times as stiff as it is, as filtered curvature may be.
+struct Overestimated : toy::Anisotropic {
+  template <class T>
+  KOKKOS_FUNCTION Mat3<T> curvature(Vec3<T> const& d) const {
+    return T(100) * Anisotropic::curvature(d);
+  }
+  template <class T>
+  KOKKOS_FUNCTION Vec3<T> gradient(Vec3<T> const& d) const {
+    return Anisotropic::curvature(d) * (d - rest<T>());
+  }
+  template <class T>
+  KOKKOS_FUNCTION T difference(Vec3<T> const& d, Vec3<T> const& step) const {
+    return dot(step, gradient(d)) + T(0.5) * dot(step, Anisotropic::curvature(d) * step);
   }
 };
 
@@ -73,6 +90,27 @@ TEST_CASE("directions along which nothing decreases are counted") {
   CHECK(report.restarts.total() == 1);
   REQUIRE(betas.size() == 9);
   for (int k = 0; k < 9; ++k) CHECK((betas[k] == 0) == (k == 0 || k == 2));
+}
+
+TEST_CASE("a step goes on along its direction where curvature was overestimated") {
+  auto const minimise = [](bool goes_on) {
+    toy::Chain<Overestimated> chain;
+    NcgOf<DaiKou>::Params params;
+    params.budget.max_iterations = 5000;
+    if (!goes_on) params.safeguard.still_steep = toy::infinity;
+    return NcgOf<DaiKou>(params).minimise(chain, chain.start());
+  };
+  auto const with = minimise(true), without = minimise(false);
+  CAPTURE(with.iterations, without.iterations);
+  CHECK(with.converged());
+  CHECK(with.extended > 0);
+  CHECK(without.extended == 0);
+  CHECK(3 * with.iterations < without.iterations);
+  // Both end in the same minimum: as much energy is lost.
+  CHECK(std::abs(with.energy_change - without.energy_change) < 1e-4 * -with.energy_change);
+
+  toy::Chain<toy::Anisotropic> right;  // where the model is right no step does
+  CHECK(NcgOf<DaiKou>().minimise(right, right.start()).extended == 0);
 }
 
 TEST_CASE("a rebuilt preconditioner does not restart the direction") {
