@@ -73,6 +73,21 @@ TEST_CASE("what a thousand steps would not bring to the tolerance need not fall"
   for (int k = 0; k < 100; ++k) CHECK(rule.check(step(1e-6)) == Stop::none);
 }
 
+TEST_CASE("what is left is a geometric series where a long window falls") {
+  // The window grows on the plateau; after it each step gains a tenth less than the one before.
+  DecrementWindow rule({.tolerance = 1e-9, .window = 8});
+  rule.start({.mass = 1, .length = 1});
+  for (int k = 0; k < 100; ++k) rule.check(step(1e-4));
+  double decrement = 1e-4;
+  for (int k = 0; k < 150; ++k) rule.check(step(decrement *= 0.9));
+  REQUIRE(rule.window() >= 32);
+  double const left = decrement * 0.9 / (1 - 0.9),
+               over_eight = decrement * (std::pow(0.9, -8) - 1) / (1 / 0.9 - 1);
+  double const estimate = rule.error_estimate();
+  CHECK(estimate >= std::sqrt(2 * left));
+  CHECK(estimate <= 1.01 * std::sqrt(2 * std::max(left, over_eight)));
+}
+
 TEST_CASE("the window grows where decrements do not fall, and shrinks where they fall fast") {
   DecrementWindow rule({.tolerance = 0.1, .window = 8});
   rule.start({.mass = 1, .length = 1});
@@ -80,8 +95,18 @@ TEST_CASE("the window grows where decrements do not fall, and shrinks where they
   for (int k = 0; k < 200; ++k) CHECK(rule.check(step(1e-4 * (1 - 1e-4 * k))) == Stop::none);
   CHECK(rule.window() == 256);
   double decrement = 1e-4;
-  // It takes the length of the window to tell.
-  for (int k = 0; k < 400; ++k) rule.check(step(decrement *= 0.7));
+  // The last steps tell, once they fall by far.
+  for (int k = 0; k < 40; ++k) rule.check(step(decrement *= 0.7));
+  CHECK(rule.window() == 8);
+
+  // Without inertia it takes the length of the window to tell.
+  rule.start({.mass = 1, .length = 1, .time_step = 1, .has_inertia = false});
+  for (int k = 0; k < 200; ++k) rule.check(step(1e-4 * (1 - 1e-4 * k)));
+  CHECK(rule.window() == 256);
+  decrement = 1e-4;
+  for (int k = 0; k < 40; ++k) rule.check(step(decrement *= 0.7));
+  CHECK(rule.window() == 256);
+  for (int k = 0; k < 360; ++k) rule.check(step(decrement *= 0.7));
   CHECK(rule.window() == 8);
 
   // A fall by half in 4 steps of 8 is enough, and nothing is slower for it.
