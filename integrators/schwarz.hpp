@@ -1,15 +1,17 @@
 // Two-level additive Schwarz preconditioner,
 //   P = sum_k R_k' (R_k H R_k')^-1 R_k + R_0' (R_0 H R_0')^-1 R_0,
 // with the aggregates k = consecutive runs of the unknowns, which lie close together in an order
-// that preserves locality, and the translations of the aggregates (or of longer runs) as coarse
-// space R_0. Where 3x3 blocks see one unknown at a time, this sees a patch of the body and,
-// coarsely, all of it; what it gains grows with the stiffness. It is made from the assembled
+// that preserves locality, and the affine motions of runs of aggregates as coarse space R_0
+// (coarse_level.hpp). Where 3x3 blocks see one unknown at a time, this sees a patch of the body
+// and, coarsely, all of it; what it gains grows with the stiffness. It is made from the assembled
 // Hessian, so rebuild it rarely.
 #pragma once
 
 #include <taut/core/sparse/aggregate_inverse.hpp>
 #include <taut/core/sparse/coarse_level.hpp>
 #include <taut/integrators/preconditioner.hpp>
+
+#include <algorithm>
 
 namespace taut {
 
@@ -18,13 +20,16 @@ template <class P = Mixed, class S = DefaultSpace, class Storage = float>
 class Schwarz {
 public:
   using Vectors = VectorField<typename P::real, S>;
+  /// Per unknown (bodies.hpp); empty: not known.
+  using BodyOf = Kokkos::View<int const*, typename S::memory>;
 
   struct Params {
     Refresh refresh = Refresh::rarely();
     int aggregate = 32;  ///< unknowns per aggregate: 8, 16, 24 or 32
-    int max_coarse =
-        1024;      ///< runs of the coarse level, which is solved serially; 0: no coarse level
-    int team = 0;  ///< threads per aggregate; 0: Kokkos chooses. The result is the same
+    /// Functions of the coarse level, which is solved serially; 0: no coarse level
+    int max_coarse = 1024;
+    int run = 128;  ///< unknowns in a run of the coarse level that moves in an affine way
+    int team = 0;   ///< threads per aggregate; 0: Kokkos chooses. The result is the same
   };
   static constexpr char const* name = "schwarz";
 
@@ -41,18 +46,22 @@ public:
   void update(E& e, VectorField<typename P::position, S> const& x) {
     auto hessian = e.pattern(x);
     e.assemble(x, hessian);
-    update(hessian, e.scale().has_inertia);
+    BodyOf body_of;
+    if constexpr (requires { e.bodies().of; }) body_of = e.bodies().of;
+    update(hessian, e.scale().has_inertia, x, body_of);
   }
-  /// From a Hessian that is assembled already.
-  void update(BlockCsr<S, double> const& hessian, bool has_inertia = true) {
+  /// From a Hessian that is assembled already. With positions, the runs of the coarse level keep to
+  /// one body each, and move in an affine way; without, they are aggregates, or longer if there are
+  /// too many, and are translated.
+  void update(BlockCsr<S, double> const& hessian, bool has_inertia = true,
+              VectorField<typename P::position, S> const& x = {}, BodyOf const& body_of = {}) {
     floored_pivots_ = local_.factorize(hessian);
     has_coarse_level_ = params_.max_coarse > 0 && local_.aggregates() > 1;
     if (!has_coarse_level_) return;
-    int const joined = (local_.aggregates() + params_.max_coarse - 1) / params_.max_coarse;
     // Rigid motion costs little with inertia, and nothing without.
     double const shift = has_inertia ? 1e-13 : 1e-8;
-    has_coarse_level_ =
-        coarse_.factorize(hessian, joined * params_.aggregate, shift) == Definiteness::positive;
+    has_coarse_level_ = coarse_.factorize(hessian, runs(hessian.rows(), x.extent(0) > 0, body_of),
+                                          shift, x) == Definiteness::positive;
   }
 
   /// z = P g. Allocates nothing.
@@ -71,6 +80,18 @@ public:
   std::size_t memory() const { return local_.memory() + coarse_.memory(); }
 
 private:
+  RunBegins runs(int n, bool affine, BodyOf const& body_of) const {
+    if (!affine) {
+      int const joined = (local_.aggregates() + params_.max_coarse - 1) / params_.max_coarse;
+      return equal_runs(n, joined * params_.aggregate);
+    }
+    int const most = std::max(params_.max_coarse / CoarseFunctions<S>::most, 1);
+    int const length = std::max(params_.run, (n + most - 1) / most);
+    if (body_of.extent_int(0) != n) return equal_runs(n, length);
+    auto const of = Kokkos::create_mirror_view_and_copy(Kokkos::HostSpace(), body_of);
+    return runs_of_bodies({of.data(), of.extent(0)}, length);
+  }
+
   Params params_;
   LocalMatrices<P, S> no_curvature_;
   AggregateInverse<S, Storage> local_;

@@ -129,13 +129,15 @@ protected:
 private:
   /// A window whose second half gains less than 1/16 of what the first did is longer than needed.
   static constexpr double much_less = 1. / 16;
+  /// Steps that are enough to tell by, whatever was before them.
+  static constexpr std::size_t tells = 32;
 
   /// The sum over the window; over one that had to grow and falls now, what a geometric series of
   /// its halves has left, but no less than the least number of steps have gained.
   double energy_left() const {
     std::size_t const known = std::min(count_, window_), quarter = window_ / 4;
     double const all = sum(0, known) * double(window_) / double(known);
-    bool const long_enough = conclusive_ && window_ >= 2 * least_ && quarter > 0;
+    bool const long_enough = conclusive_ && window_ >= std::max(2 * least_, tells / 2);
     if (!long_enough || !scale_.has_inertia) return all;  // without inertia slow modes hide
     double const last = sum(0, quarter), late = last + sum(quarter, 2 * quarter);
     double const before = late - last, early = all - late;
@@ -154,7 +156,8 @@ private:
   }
   void adapt() {
     // Where inertia bounds how slow a mode can be, the last steps tell, whatever was before them.
-    for (std::size_t w = 4 * least_; scale_.has_inertia && w < window_ && w <= count_; w *= 2) {
+    for (std::size_t w = std::max(4 * least_, tells);
+         scale_.has_inertia && w < window_ && w <= count_; w *= 2) {
       if (!falls(w, much_less)) continue;
       window_ = w;
       break;

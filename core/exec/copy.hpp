@@ -11,6 +11,7 @@
 #include <cstddef>
 #include <string>
 #include <type_traits>
+#include <vector>
 
 namespace taut {
 namespace kernels {
@@ -139,6 +140,18 @@ void assign_on(To const& to, From const& from) {
       Kokkos::deep_copy(S::instance(), to, static_cast<typename To::value_type>(from));
     }
   }
+}
+
+/// A copy of a host vector in a space.
+template <class S, class T>
+Kokkos::View<T const*, typename S::memory, Kokkos::MemoryTraits<Kokkos::RandomAccess>> to_space(
+    char const* name, std::vector<T> const& from) {
+  Kokkos::View<T*, typename S::memory> to(
+      Kokkos::view_alloc(Kokkos::WithoutInitializing, std::string(name)), from.size());
+  Kokkos::View<T const*, Kokkos::HostSpace, Kokkos::MemoryTraits<Kokkos::Unmanaged>> host(
+      from.data(), from.size());
+  assign(to, host);
+  return to;
 }
 
 }  // namespace taut

@@ -72,18 +72,6 @@ struct PatchViews {
   Data<Real> rest;
 };
 
-/// Copies a host vector to a space.
-template <class S, class T>
-Kokkos::View<T const*, typename S::memory, Kokkos::MemoryTraits<Kokkos::RandomAccess>> to_space(
-    char const* name, std::vector<T> const& from) {
-  Kokkos::View<T*, typename S::memory> to(
-      Kokkos::view_alloc(Kokkos::WithoutInitializing, std::string(name)), from.size());
-  Kokkos::View<T const*, Kokkos::HostSpace, Kokkos::MemoryTraits<Kokkos::Unmanaged>> host(
-      from.data(), from.size());
-  assign(to, host);
-  return to;
-}
-
 /// `rest` holds ten doubles per element of `patches` (B by columns, W).
 template <class S, class Real>
 PatchViews<S, Real> copy_patches(Patches const& patches, std::vector<double> const& rest) {

@@ -11,6 +11,7 @@
 #include <catch2/generators/catch_generators.hpp>
 #include <catch2/matchers/catch_matchers_string.hpp>
 
+#include <cmath>
 #include <numeric>
 
 namespace {
@@ -26,10 +27,11 @@ using Compact = Schwarz<Fp64, S, float>;
 static_assert(Preconditioner<Schwarz<Mixed, DefaultSpace>, toy::Chain<toy::Barrier, Mixed>>);
 
 template <class Method, class S>
-Method make(BlockCsr<S> const& a, typename Method::Params const& params) {
+Method make(BlockCsr<S> const& a, typename Method::Params const& params,
+            VectorField<double, S> const& x = {}) {
   Method schwarz(params);
   schwarz.resize(a.rows());
-  schwarz.update(a);
+  schwarz.update(a, true, x);
   return schwarz;
 }
 
@@ -40,9 +42,51 @@ std::vector<double> applied(Method const& schwarz, typename Method::Vectors cons
   return numbers(z);
 }
 
-/// sum_k R_k' (R_k A R_k')^-1 R_k g, with aggregates of `run` unknowns and, if any, coarse runs.
+double scalar_product(std::vector<double> const& a, std::vector<double> const& b) {
+  return std::inner_product(a.begin(), a.end(), b.begin(), 0.0);
+}
+
+/// Where the unknowns of lattice_matrix lie.
+template <class S>
+VectorField<double, S> lattice_points(int n) {
+  VectorField<double, S> const x("lattice_points", n * n * n);
+  auto const host = Kokkos::create_mirror_view(x);
+  for (int i = 0; i < n * n * n; ++i) {
+    host(i, 0) = i % n;
+    host(i, 1) = i / n % n;
+    host(i, 2) = i / (n * n);
+  }
+  assign(x, host);
+  return x;
+}
+
+/// Coarse functions: each has a value per unknown.
+using Functions = std::vector<std::vector<double>>;
+
+/// One on each run of so many of n unknowns.
+Functions constants(int n, int run) {
+  Functions functions;
+  for (int first = 0; first < n; first += run) {
+    functions.emplace_back(n, 0.0);
+    for (int i = first; i < std::min(n, first + run); ++i) functions.back()[i] = 1;
+  }
+  return functions;
+}
+
+/// Those of runs that move in an affine way.
+Functions affine(RunBegins const& begin, VectorField<double, SerialSpace> const& x) {
+  Functions functions;
+  for (std::size_t r = 0; r + 1 < begin.size(); ++r)
+    for (int m = 0; m < 4; ++m) {
+      functions.emplace_back(begin.back(), 0.0);
+      for (int i = begin[r]; i < begin[r + 1]; ++i) functions.back()[i] = m == 0 ? 1 : x(i, m - 1);
+    }
+  return functions;
+}
+
+/// sum_k R_k' (R_k A R_k')^-1 R_k g, with aggregates of `run` unknowns and the coarse functions.
 std::vector<double> formula(BlockCsr<SerialSpace> const& a, std::vector<double> const& g, int run,
-                            int coarse_run) {
+                            Functions const& functions) {
   Dense const full = dense(a);
   int const rows = 3 * a.rows();
   std::vector<double> z(g.size(), 0.0);
@@ -54,28 +98,30 @@ std::vector<double> formula(BlockCsr<SerialSpace> const& a, std::vector<double> 
     auto const part = dense_solve(block, {g.begin() + first, g.begin() + first + size});
     for (int i = 0; i < size; ++i) z[first + i] += part[i];
   }
-  if (coarse_run == 0) return z;
+  if (functions.empty()) return z;
 
-  int const runs = (a.rows() + coarse_run - 1) / coarse_run;
-  auto const coarse = [&](int i) { return 3 * (i / 3 / coarse_run) + i % 3; };
   auto const coupled = [&](int i) {
     for (int j = 0; j < rows; ++j)
       if (j / 3 != i / 3 && full[i][j] != 0) return true;
     return false;
   };
-  Dense galerkin(3 * runs, std::vector<double>(3 * runs, 0.0));
-  std::vector<double> restricted(3 * runs, 0.0);
-  for (int i = 0; i < rows; ++i) {
-    if (!coupled(i)) continue;
-    restricted[coarse(i)] += g[i];
-    for (int j = 0; j < rows; ++j)
-      if (coupled(j)) galerkin[coarse(i)][coarse(j)] += full[i][j];
+  int const coarse = 3 * static_cast<int>(functions.size());
+  Dense r(coarse, std::vector<double>(rows, 0.0));
+  for (int k = 0; k < coarse; ++k)
+    for (int i = 0; i < rows; ++i)
+      if (i % 3 == k % 3 && coupled(i)) r[k][i] = functions[k / 3][i / 3];
+  Dense galerkin(coarse, std::vector<double>(coarse, 0.0));
+  std::vector<double> restricted(coarse, 0.0);
+  for (int k = 0; k < coarse; ++k) {
+    restricted[k] = scalar_product(r[k], g);
+    std::vector<double> ar(rows, 0.0);
+    for (int i = 0; i < rows; ++i) ar[i] = scalar_product(full[i], r[k]);
+    for (int l = 0; l < coarse; ++l) galerkin[k][l] = scalar_product(r[l], ar);
+    if (galerkin[k][k] == 0) galerkin[k][k] = 1;  // a run that is fixed altogether
   }
-  for (int i = 0; i < 3 * runs; ++i)
-    if (galerkin[i][i] == 0) galerkin[i][i] = 1;  // a run that is fixed altogether
   std::vector<double> const correction = dense_solve(galerkin, restricted);
-  for (int i = 0; i < rows; ++i)
-    if (coupled(i)) z[i] += correction[coarse(i)];
+  for (int k = 0; k < coarse; ++k)
+    for (int i = 0; i < rows; ++i) z[i] += r[k][i] * correction[k];
   return z;
 }
 
@@ -88,10 +134,6 @@ void fix(BlockCsr<SerialSpace> const& a, std::vector<int> const& unknowns) {
     for (int k = a.row_begin(i); k < a.row_begin(i + 1); ++k)
       if (fixed(i) || fixed(a.column(k)))
         a.block(k) = (i == a.column(k) ? 1.0 : 0.0) * identity3<double>();
-}
-
-double scalar_product(std::vector<double> const& a, std::vector<double> const& b) {
-  return std::inner_product(a.begin(), a.end(), b.begin(), 0.0);
 }
 
 /// 3x3 block Jacobi from a matrix.
@@ -155,8 +197,58 @@ TEST_CASE("additive Schwarz equals its formula") {
     int const coarse_run = max_coarse > 0 ? run * ((aggregates + max_coarse - 1) / max_coarse) : 0;
     CHECK(schwarz.has_coarse_level() == (max_coarse > 0));
     CHECK(schwarz.floored_pivots() == 0);
-    CHECK(relative_difference(applied(schwarz, g), formula(a, numbers(g), run, coarse_run)) < 1e-8);
+    Functions const functions = coarse_run > 0 ? constants(a.rows(), coarse_run) : Functions();
+    CHECK(relative_difference(applied(schwarz, g), formula(a, numbers(g), run, functions)) < 1e-8);
   }
+}
+
+TEST_CASE("with positions, runs of one body each move in an affine way") {
+  auto const a = lattice_matrix<SerialSpace>(5, 0.01);
+  fix(a, {0, 7, 8, 9, 64, 124});
+  auto const x = random_field<double, SerialSpace>(a.rows(), 5);
+  Kokkos::View<int*, Kokkos::HostSpace> const body("body", a.rows());
+  for (int i = 0; i < a.rows(); ++i) body(i) = i < 50 ? 0 : 1;
+  Precise<SerialSpace> schwarz({.aggregate = 16, .run = 30});
+  schwarz.resize(a.rows());
+  schwarz.update(a, true, x, body);
+  REQUIRE(schwarz.has_coarse_level());
+  auto const g = random_field<double, SerialSpace>(a.rows(), 2);
+  CHECK(relative_difference(applied(schwarz, g),
+                            formula(a, numbers(g), 16, affine({0, 25, 50, 75, 100, 125}, x))) <
+        1e-8);
+  // As many functions as asked for: 4 of each of two runs.
+  Precise<SerialSpace> coarser({.aggregate = 16, .max_coarse = 8, .run = 30});
+  coarser.resize(a.rows());
+  coarser.update(a, true, x);
+  CHECK(relative_difference(applied(coarser, g),
+                            formula(a, numbers(g), 16, affine({0, 63, 125}, x))) < 1e-8);
+}
+
+TEST_CASE("runs that are flat, lines or points have a coarse level all the same") {
+  auto const a = lattice_matrix<DefaultSpace>(5, 0.01);
+  int const dimensions = GENERATE(0, 1, 2);
+  auto const x = random_field<double, DefaultSpace>(a.rows(), 5);
+  for (int i = 0; i < a.rows(); ++i)
+    for (int c = dimensions; c < 3; ++c) x(i, c) = dimensions > 0 ? 2 * x(i, 0) + 1 : 1;
+  Compact<DefaultSpace> schwarz({.aggregate = 16, .run = 16});
+  schwarz.resize(a.rows());
+  schwarz.update(a, true, x);
+  CHECK(schwarz.has_coarse_level());
+  for (unsigned seed = 0; seed < 20; ++seed) {
+    auto const g = random_field<double, DefaultSpace>(a.rows(), seed);
+    std::vector<double> const z = applied(schwarz, g);
+    CHECK(scalar_product(numbers(g), z) > 0);
+    for (double const v : z) CHECK(std::isfinite(v));
+  }
+}
+
+TEST_CASE("runs keep to bodies, and those of a body are about as long") {
+  CHECK(equal_runs(10, 4) == RunBegins{0, 4, 8, 10});
+  std::vector<int> of(10, 3);
+  of[9] = 1;
+  CHECK(runs_of_bodies(of, 4) == RunBegins{0, 3, 6, 9, 10});
+  CHECK(runs_of_bodies(of, 100) == RunBegins{0, 9, 10});
+  CHECK(runs_of_bodies({}, 4) == RunBegins{0});
 }
 
 TEST_CASE("fixed unknowns with zero gradient do not move") {
@@ -225,18 +317,22 @@ TEST_CASE("additive Schwarz is bitwise the same for every space, layout and team
   using Left = Space<Kokkos::Serial, Kokkos::LayoutLeft>;
   using Threads = DefaultSpace;
   auto const serial = lattice_matrix<SerialSpace>(6, 0.01);
-  Compact<SerialSpace>::Params const params{.aggregate = 16};
-  std::vector<double> const expected = applied(make<Compact<SerialSpace>>(serial, params),
-                                               random_field<double, SerialSpace>(serial.rows(), 4));
+  Compact<SerialSpace>::Params const params{.aggregate = 16, .run = 64};
+  std::vector<double> const expected =
+      applied(make<Compact<SerialSpace>>(serial, params,
+                                         random_field<double, SerialSpace>(serial.rows(), 9)),
+              random_field<double, SerialSpace>(serial.rows(), 4));
 
-  auto const left = make<Compact<Left>>(lattice_matrix<Left>(6, 0.01), {.aggregate = 16});
+  auto const left = make<Compact<Left>>(lattice_matrix<Left>(6, 0.01), {.aggregate = 16, .run = 64},
+                                        random_field<double, Left>(serial.rows(), 9));
   CHECK(applied(left, random_field<double, Left>(serial.rows(), 4)) == expected);
 
   int const largest = Threads::team_policy(1, 1).team_size_max(
       kernels::ApplyAggregate<Threads, float, double>{}, Kokkos::ParallelForTag());
   for (int team = 0; team <= largest; ++team) {
-    auto const threads =
-        make<Compact<Threads>>(lattice_matrix<Threads>(6, 0.01), {.aggregate = 16, .team = team});
+    auto const threads = make<Compact<Threads>>(lattice_matrix<Threads>(6, 0.01),
+                                                {.aggregate = 16, .run = 64, .team = team},
+                                                random_field<double, Threads>(serial.rows(), 9));
     CHECK(applied(threads, random_field<double, Threads>(serial.rows(), 4)) == expected);
   }
 }
@@ -247,9 +343,14 @@ TEST_CASE("additive Schwarz cuts the iterations of conjugate gradients") {
   int const one_level =
       iterations(a, make<Compact<DefaultSpace>>(a, {.aggregate = 32, .max_coarse = 0}));
   int const both = iterations(a, make<Compact<DefaultSpace>>(a, {.aggregate = 32}));
-  CAPTURE(jacobi, one_level, both);
+  Compact<DefaultSpace> affine({.aggregate = 32});
+  affine.resize(a.rows());
+  affine.update(a, true, lattice_points<DefaultSpace>(16));
+  int const long_runs = iterations(a, affine);
+  CAPTURE(jacobi, one_level, both, long_runs);
   CHECK(1.6 * one_level < jacobi);
   CHECK(4 * both < jacobi);
+  CHECK(long_runs < 1.2 * both);  // with a third of the coarse unknowns
 }
 
 TEST_CASE("additive Schwarz refuses aggregates that its kernels cannot hold") {

@@ -1,8 +1,10 @@
 // Additive Schwarz inside nonlinear CG: rebuilt rarely, without a restart.
+#include "elastic_bar.hpp"
 #include "toy_objectives.hpp"
 
 #include <taut/integrators/ncg.hpp>
 #include <taut/integrators/schwarz.hpp>
+#include <taut/integrators/time_stepper.hpp>
 
 #include <catch2/catch_test_macros.hpp>
 
@@ -40,6 +42,24 @@ TEST_CASE("nonlinear CG needs fewer iterations with additive Schwarz") {
   for (int i = 0; i < chain.size(); ++i)
     for (int c = 0; c < 3; ++c) largest = std::max(largest, std::abs(x(i, c) - y(i, c)));
   CHECK(largest < 1e-6);
+}
+
+TEST_CASE("a coarse level that can turn carries bending") {
+  using Method = Ncg<DaiKou, Schwarz, SufficientDecrease, DecrementWindow, Fp64>;
+  test::Bar<Fp64> const bar({1, 0.1, 0.1}, 30, 1e6);
+  auto const iterations = [&](int max_coarse) {
+    auto potential = bar.potential({0, 0, 0}, -1);
+    State<Fp64> state(bar.positions());
+    Method::Params params;
+    params.preconditioner.max_coarse = max_coarse;
+    params.budget.max_iterations = 5000;
+    auto const report = QuasiStatic<Method>(params).step(potential, state, 0.01);
+    CHECK(report.converged());
+    return report.iterations;
+  };
+  int const with = iterations(1024), without = iterations(0);
+  CAPTURE(with, without);
+  CHECK(4 * with < without);
 }
 
 TEST_CASE("applying additive Schwarz allocates nothing") {
