@@ -1,8 +1,8 @@
 // Two-level additive Schwarz preconditioner,
 //   P = sum_k R_k' (R_k H R_k')^-1 R_k + R_0' (R_0 H R_0')^-1 R_0,
 // with the aggregates k = consecutive runs of the unknowns, which lie close together in an order
-// that preserves locality, and the affine motions of runs of aggregates as coarse space R_0
-// (coarse_level.hpp). Where 3x3 blocks see one unknown at a time, this sees a patch of the body
+// that preserves locality, and the affine motions of longer runs, of one body each, as coarse space
+// R_0 (coarse_level.hpp). Where 3x3 blocks see one unknown at a time, this sees a patch of the body
 // and, coarsely, all of it; what it gains grows with the stiffness. It is made from the assembled
 // Hessian, so rebuild it rarely.
 #pragma once

@@ -22,6 +22,7 @@
 #include <vector>
 
 namespace taut {
+
 /// What R is made of: `count` functions of each run of unknowns, 1 or 4.
 template <class S>
 struct CoarseFunctions {
@@ -94,13 +95,13 @@ struct LinearFunctions {
       centre = centre + load3<double>(x, i);
       ++n;
     }
-    if (n == 0) return;
-    centre = (1 / n) * centre;
+    double const share = n > 0 ? 1 / n : 0;
+    centre = share * centre;
     Mat3<double> variance{};
     for (int i = first; i < last; ++i) {
       if (!functions.has(i)) continue;
       Vec3<double> const d = load3<double>(x, i) - centre;
-      variance = variance + (1 / n) * outer(d, d);
+      variance = variance + share * outer(d, d);
     }
     auto const axes = symmetric_eigen(symmetric_part(variance));
     for (int i = first; i < last; ++i) {
@@ -224,10 +225,10 @@ template <class S>
 class CoarseLevel {
 public:
   /// Builds and factors R A R' for these runs, with linear functions where `x` has the positions of
-  /// the unknowns. `shift` times the sum of the diagonal of A over a run is added to
-  /// the diagonal: a body that floats without inertia, whose translations cost nothing, must leave
-  /// it invertible, and amplify the round-off of r by no more than 1 / shift. Anything but
-  /// `positive` means that A is not positive semi-definite, and that the level must not be used.
+  /// the unknowns. `shift` times what the diagonal of A gives a function is added to the diagonal:
+  /// a body that floats without inertia, whose translations cost nothing, must leave it invertible,
+  /// and amplify the round-off of r by no more than 1 / shift. Anything but `positive` means that A
+  /// is not positive semi-definite, and that the level must not be used.
   template <class T = double>
   Definiteness factorize(BlockCsr<S, double> const& a, RunBegins const& begin, double shift,
                          VectorField<T, S> const& x = {}) {

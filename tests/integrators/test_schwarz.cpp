@@ -216,6 +216,14 @@ TEST_CASE("with positions, runs of one body each move in an affine way") {
   CHECK(relative_difference(applied(schwarz, g),
                             formula(a, numbers(g), 16, affine({0, 25, 50, 75, 100, 125}, x))) <
         1e-8);
+  // Unknowns that are fixed later leave the level.
+  std::vector<int> first(25);
+  std::iota(first.begin(), first.end(), 0);
+  fix(a, first);
+  schwarz.update(a, true, x, body);
+  CHECK(relative_difference(applied(schwarz, g),
+                            formula(a, numbers(g), 16, affine({0, 25, 50, 75, 100, 125}, x))) <
+        1e-8);
   // As many functions as asked for: 4 of each of two runs.
   Precise<SerialSpace> coarser({.aggregate = 16, .max_coarse = 8, .run = 30});
   coarser.resize(a.rows());
