@@ -137,7 +137,7 @@ private:
   double energy_left() const {
     std::size_t const known = std::min(count_, window_), quarter = window_ / 4;
     double const all = sum(0, known) * double(window_) / double(known);
-    bool const long_enough = conclusive_ && window_ >= std::max(2 * least_, tells / 2);
+    bool const long_enough = conclusive_ && window_ >= std::max(2 * least_, tells);
     if (!long_enough || !scale_.has_inertia) return all;  // without inertia slow modes hide
     double const last = sum(0, quarter), late = last + sum(quarter, 2 * quarter);
     double const before = late - last, early = all - late;

@@ -282,11 +282,11 @@ struct MetalStep {
 TEST_CASE("a strong cycle ends a stiff step in fewer iterations", "[mpm][hot]") {
   using Minimiser = Lbfgs<ParticleMultigrid, SufficientDecrease, DecrementWindow, P>;
   MetalStep step;
-  auto const run = [&](int from) {
+  auto const run = [&](int from, double tolerance = 1e-3) {
     auto const x = step.start();
     Minimiser minimiser({.lbfgs = {.newton_step = false},
                          .preconditioner = {.strengthening = {.from = from}},
-                         .stop = {.window = 4},
+                         .stop = {.tolerance = tolerance, .window = 4},
                          .budget = {.max_iterations = 2000}});
     return minimiser.minimise(step.scene, x);
   };
@@ -305,6 +305,17 @@ TEST_CASE("a strong cycle ends a stiff step in fewer iterations", "[mpm][hot]") 
   CHECK(always.strengthened == always.refreshes);
   CHECK(std::abs(strong.energy_change - always.energy_change) <
         1e-3 * std::abs(always.energy_change));
+
+  // What the plain one says of its error holds: half of M e^2 is no more than the energy left.
+  double const exact = run(1, 1e-7).energy_change;
+  for (double const tolerance : {1e-2, 1e-3}) {
+    auto const report = run(0, tolerance);
+    double const error =
+        std::sqrt(2 * std::max(report.energy_change - exact, 0.0) / step.scene.scale().mass);
+    CAPTURE(tolerance, report.iterations, error, report.error_estimate_m);
+    CHECK(report.converged());
+    CHECK(error < 3 * report.error_estimate_m);
+  }
 }
 
 }  // namespace
