@@ -56,10 +56,7 @@ public:
   /// The same where kernels run.
   template <class S>
   kernels::FrictionMatrix<S> in_space() const {
-    Kokkos::View<double*, typename S::memory> const to("friction_coefficients", entry_.size());
-    assign(to, Kokkos::View<double const*, Kokkos::HostSpace, Kokkos::MemoryUnmanaged>(
-                   entry_.data(), entry_.size()));
-    return {others_, objects_, to};
+    return {others_, objects_, to_space<S>("friction_coefficients", entry_)};
   }
 
 private:

@@ -3,7 +3,7 @@
 // triangles alone (a moving obstacle) enter alike, and several bodies are one surface.
 #pragma once
 
-#include <taut/core/fem/patches.hpp>
+#include <taut/core/exec/copy.hpp>
 #include <taut/core/fem/tet_mesh.hpp>
 
 #include <algorithm>

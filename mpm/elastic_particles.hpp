@@ -96,7 +96,7 @@ public:
   /// `team_size`: threads per patch where not packed; 0: one on the host, 64 on a device. Throws
   /// Error if there is no material.
   explicit ElasticParticles(std::vector<MaterialParameters> const& materials, int team_size = 0)
-      : materials_(to_space(materials)), team_size_(packed_ ? 1 : team_size) {
+      : materials_(to_space<Space>("materials", materials)), team_size_(packed_ ? 1 : team_size) {
     if (materials.empty()) throw Error("ElasticParticles: no materials; give one or more");
     if (team_size_ == 0) team_size_ = Space::on_host ? 1 : 64;
     List<double> const norms("material_norm", materials.size());
@@ -286,14 +286,6 @@ private:
   template <class T>
   using List = Kokkos::View<T*, typename Space::memory>;
   static constexpr int stencil = K::width * K::width * K::width;
-
-  static List<MaterialParameters const> to_space(std::vector<MaterialParameters> const& list) {
-    List<MaterialParameters> const view("materials", list.size());
-    auto const host = Kokkos::create_mirror_view(view);
-    for (std::size_t k = 0; k < list.size(); ++k) host(k) = list[k];
-    assign(view, host);
-    return view;
-  }
 
   kernels::ParticleSweep<Space, Precision, Material, K, packed_> frame(Positions const& x) const {
     return {{blocks_}, data_, materials_, {x, rest_}, static_cast<Real>(dx_), memory_};

@@ -144,8 +144,7 @@ void assign_on(To const& to, From const& from) {
 
 /// A copy of a host vector in a space.
 template <class S, class T>
-Kokkos::View<T const*, typename S::memory, Kokkos::MemoryTraits<Kokkos::RandomAccess>> to_space(
-    char const* name, std::vector<T> const& from) {
+Kokkos::View<T*, typename S::memory> to_space(char const* name, std::vector<T> const& from) {
   Kokkos::View<T*, typename S::memory> to(
       Kokkos::view_alloc(Kokkos::WithoutInitializing, std::string(name)), from.size());
   Kokkos::View<T const*, Kokkos::HostSpace, Kokkos::MemoryTraits<Kokkos::Unmanaged>> host(

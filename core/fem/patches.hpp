@@ -15,7 +15,6 @@
 #include <taut/core/math/scalar.hpp>
 
 #include <span>
-#include <string>
 #include <vector>
 
 namespace taut {

@@ -32,14 +32,6 @@ struct Bodies {
 
 namespace kernels {
 
-template <class S>
-typename Bodies<S>::Indices indices_in_space(char const* name, std::vector<int> const& from) {
-  typename Bodies<S>::Indices const to(name, from.size());
-  using Host = Kokkos::View<int const*, Kokkos::HostSpace, Kokkos::MemoryUnmanaged>;
-  assign(to, Host(from.data(), from.size()));
-  return to;
-}
-
 /// Of each of n unknowns, the smallest that elements connect it with; n where it has no element.
 inline std::vector<int> smallest_of_body(int n, std::span<Connectivity const> kinds) {
   std::vector<int> parent(n);
@@ -148,10 +140,10 @@ Bodies<S> make_bodies(int n, std::span<Connectivity const> kinds) {
   }
   return {count,
           static_cast<int>(unknown_begin.size()) - 1,
-          kernels::indices_in_space<S>("body_of", of),
-          kernels::indices_in_space<S>("body_chunks", chunk_begin),
-          kernels::indices_in_space<S>("body_unknown_begin", unknown_begin),
-          kernels::indices_in_space<S>("body_unknowns", unknown)};
+          to_space<S>("body_of", of),
+          to_space<S>("body_chunks", chunk_begin),
+          to_space<S>("body_unknown_begin", unknown_begin),
+          to_space<S>("body_unknowns", unknown)};
 }
 
 /// Sums over each body, up to `max_sums` side by side. Owns its memory, so that a sum allocates

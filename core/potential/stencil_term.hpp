@@ -188,9 +188,9 @@ public:
       }
     }
     Buckets const incidence = sort_into_buckets(vertices_, unknowns);
-    vertex_ = copy("stencil_vertex", vertices_);
-    incidence_begin_ = copy("stencil_incidence_begin", incidence.begin);
-    incidence_ = copy("stencil_incidence", incidence.item);
+    vertex_ = to_space<Space>("stencil_vertex", vertices_);
+    incidence_begin_ = to_space<Space>("stencil_incidence_begin", incidence.begin);
+    incidence_ = to_space<Space>("stencil_incidence", incidence.item);
   }
 
   double value(Positions const& x, double scale) const {
@@ -246,12 +246,6 @@ private:
   using Data = kernels::StencilData<Kernel, Space, Precision>;
   using Indices = Kokkos::View<int*, typename Space::memory>;
 
-  static Indices copy(char const* name, std::vector<int> const& from) {
-    Indices to(name, from.size());
-    assign(to, Kokkos::View<int const*, Kokkos::HostSpace, Kokkos::MemoryUnmanaged>(from.data(),
-                                                                                    from.size()));
-    return to;
-  }
   int count() const { return static_cast<int>(vertices_.size()) / N; }
   Data data(Positions const& x, Vectors const& p) const {
     return {kernel_, vertex_, incidence_begin_, incidence_, x, p};

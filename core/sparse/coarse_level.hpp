@@ -269,7 +269,10 @@ public:
   }
 
   int runs() const { return runs_; }
-  std::size_t memory() const { return solver_.memory() + functions_.value.span() * sizeof(double); }
+  std::size_t memory() const {
+    return solver_.memory() + functions_.value.span() * sizeof(double) +
+           functions_.run.span() * sizeof(int);
+  }
 
 private:
   int runs_ = 0;

@@ -44,14 +44,6 @@ struct Overestimated : toy::Anisotropic {
   KOKKOS_FUNCTION Mat3<T> curvature(Vec3<T> const& d) const {
     return T(100) * Anisotropic::curvature(d);
   }
-  template <class T>
-  KOKKOS_FUNCTION Vec3<T> gradient(Vec3<T> const& d) const {
-    return Anisotropic::curvature(d) * (d - rest<T>());
-  }
-  template <class T>
-  KOKKOS_FUNCTION T difference(Vec3<T> const& d, Vec3<T> const& step) const {
-    return dot(step, gradient(d)) + T(0.5) * dot(step, Anisotropic::curvature(d) * step);
-  }
 };
 
 template <class Beta>
