@@ -3,7 +3,7 @@
 #include <taut/apps/bench/contact.hpp>
 #include <taut/apps/bench/elastic.hpp>
 #include <taut/apps/bench/hot.hpp>
-#include <taut/apps/program/command_line.hpp>
+#include <taut/apps/program/parse_command_line.hpp>
 
 #include <fmt/core.h>
 #include <CLI/CLI.hpp>
@@ -58,10 +58,6 @@ int main(int argc, char** argv) {
   hot_app->footer("example: taut bench hot --cells 32 --threads 1");
   hot_app->callback([&] { command = [&] { return bench_hot_command(hot); }; });
 
-  if (auto const message = unknown_command(app.get_name(), commands_of(app), argc, argv)) {
-    fmt::print(stderr, "taut: {}\n", *message);
-    return 1;
-  }
-  CLI11_PARSE(app, argc, argv);
+  if (auto const status = parse_command_line(app, argc, argv)) return *status;
   return ending_in_words(command);  // a bench starts Kokkos itself, once per number of threads
 }

@@ -25,6 +25,19 @@ std::optional<std::string> unknown_command(std::string const& program,
                      suggestion(": did you mean \"", argv[1], views, "\"?"), program);
 }
 
+std::string unexpected_words(std::string const& command, std::vector<std::string> const& options,
+                             std::vector<std::string> const& words) {
+  auto const option = std::find_if(words.begin(), words.end(),
+                                   [](std::string const& word) { return word.starts_with('-'); });
+  if (option == words.end())
+    return fmt::format("\"{}\" is a word too many for `{}`; `{} --help` lists what it takes",
+                       words.front(), command, command);
+  std::string const name = option->substr(0, option->find('='));
+  std::vector<std::string_view> const views(options.begin(), options.end());
+  return fmt::format("`{}` has no option {}{}; `{} --help` lists them", command, name,
+                     suggestion(": did you mean ", name, views, "?"), command);
+}
+
 int hand_over(std::string const& program, char** argv, std::string const& what) {
   if (char const* build = std::getenv("TAUT_BUILD")) {
     if (std::system(fmt::format("{} {}", build, program).c_str()) != 0) {

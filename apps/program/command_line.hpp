@@ -16,18 +16,15 @@ auto* add_list(App& command, std::string const& option, std::vector<T>& list,
   return command.add_option(option, list, help)->delimiter(',')->allow_extra_args(false);
 }
 
-/// The names of the subcommands of `app`, a CLI::App.
-template <class App>
-std::vector<std::string> commands_of(App const& app) {
-  std::vector<std::string> names;
-  for (auto const* command : app.get_subcommands({})) names.push_back(command->get_name());
-  return names;
-}
-
 /// Where the first argument is none of `commands`: a sentence that names the nearest, if any is.
 std::optional<std::string> unknown_command(std::string const& program,
                                            std::vector<std::string> const& commands, int argc,
                                            char** argv);
+
+/// Of the words that a command line has too many, never none: a sentence that names the first
+/// option among them, and the nearest of `options`, or the first word.
+std::string unexpected_words(std::string const& command, std::vector<std::string> const& options,
+                             std::vector<std::string> const& words);
 
 /// The program `taut`, from its command line to its exit status.
 int run_program(int argc, char** argv);

@@ -1,8 +1,8 @@
 // The program `taut`: maps the command line onto the commands.
 #include <taut/apps/chart/chart.hpp>
-#include <taut/apps/program/command_line.hpp>
 #include <taut/apps/program/commands.hpp>
 #include <taut/apps/program/late_part.hpp>
+#include <taut/apps/program/parse_command_line.hpp>
 #include <taut/apps/program/render.hpp>
 #include <taut/core/io/hdf5.hpp>
 #include <taut/core/report/error.hpp>
@@ -178,11 +178,7 @@ int taut::run_program(int argc, char** argv) {
     if (sub == bench_app) continue;
     sub->add_option("--threads", threads, "threads to use (all)")->check(CLI::Range(1, 4096));
   }
-  if (auto const message = unknown_command(app.get_name(), commands_of(app), argc, argv)) {
-    fmt::print(stderr, "taut: {}\n", *message);
-    return 1;
-  }
-  CLI11_PARSE(app, argc, argv);
+  if (auto const status = parse_command_line(app, argc, argv)) return *status;
 
   Kokkos::InitializationSettings settings;
   settings.set_disable_warnings(true);
