@@ -12,9 +12,9 @@
 // 2r) and d = (1 + r) / (1 + 2r): 4/3, 1/3 and 2/3 while h does not change.
 //
 // Body forces are part of V. The minimisation starts from the predictor, the minimum of all terms
-// but the swept ones (x + h v + h^2 g for implicit Euler); vertices and pins go there together, as
-// far as no element of a pinned body folds, and the minimiser carries what is left of the pins'
-// motion through its iterations.
+// but the swept ones (x + h v + h^2 g for implicit Euler), or nearer to a rigid motion of each body
+// (rigid_predictor.hpp); vertices and pins go there together, as far as no element of a pinned body
+// folds, and the minimiser carries what is left of the pins' motion through its iterations.
 #pragma once
 
 #include <taut/core/exec/copy.hpp>
@@ -24,6 +24,7 @@
 #include <taut/core/potential/objective.hpp>
 #include <taut/core/report/error.hpp>
 #include <taut/integrators/report.hpp>
+#include <taut/integrators/rigid_predictor.hpp>
 #include <taut/integrators/sleep.hpp>
 
 #include <cmath>
@@ -175,8 +176,9 @@ public:
   TimeStepper() = default;
   /// Throws Error unless there is at least one pass, and where sleep makes no sense.
   explicit TimeStepper(Params const& params, Lagging const& lagging = {},
-                       typename Sleep<Precision, Space>::Params const& sleep = {})
-      : minimiser_(params), lagging_(lagging), sleep_(sleep) {
+                       typename Sleep<Precision, Space>::Params const& sleep = {},
+                       typename RigidPredictor<Precision, Space>::Params const& rigid = {})
+      : minimiser_(params), lagging_(lagging), sleep_(sleep), rigid_predictor_(rigid) {
     if (lagging.passes < 1) {
       throw Error("a time step of {} minimisations: give 1 pass or more", lagging.passes);
     }
@@ -218,7 +220,10 @@ private:
     potential.begin_step(state.x, r.scale * (R::inertia ? h * h : 1.0), h * std::sqrt(r.scale),
                          R::inertia);
     potential.predict(x_);
-    if (R::inertia) sleep_.lie(potential, state.x, x_, h);
+    if (R::inertia) {
+      sleep_.lie(potential, state.x, x_, h);
+      rigid_predictor_.start(potential, state, x_);
+    }
     start(potential, state);
     auto report = minimiser_.minimise(potential, x_, observer);
     for (int pass = 1; pass < lagging_.passes && report.stop != Stop::non_finite; ++pass) {
@@ -255,6 +260,7 @@ private:
   Minimiser minimiser_;
   Lagging lagging_;
   Sleep<Precision, Space> sleep_;
+  RigidPredictor<Precision, Space> rigid_predictor_;
   Positions x_;
   VectorField<typename Precision::real, Space> direction_;
   Resizable<Positions> x_memory_;

@@ -140,6 +140,12 @@ std::span<OptionKey const> solver_keys() {
        {},
        "nonlinear CG, instead of islands: what contact acts on has a direction weight and a step "
        "of its own, and what is free has others"},
+      {"rigid_predictor",
+       true,
+       {},
+       {},
+       "a step starts nearer to a rigid motion of each free body, the less of its own motion the "
+       "body kept in the step before; off: from the predictor of single vertices"},
       {"sleep_speed",
        0.0,
        {.min = 0, .max = 1e9, .unit = "m/s"},

@@ -41,8 +41,8 @@ public:
         forces_("forces", size()),
         fixed_(Kokkos::create_mirror_view(potential_.unknowns().fixed)),
         prescribed_(Kokkos::create_mirror_view(potential_.unknowns().prescribed)),
-        euler_(scene_.solver, lagging(), sleep()),
-        bdf2_(scene_.solver, lagging(), sleep()),
+        euler_(scene_.solver, lagging(), sleep(), rigid_predictor()),
+        bdf2_(scene_.solver, lagging(), sleep(), rigid_predictor()),
         static_(scene_.solver, lagging()) {
     write(state_.x, geometry.start, mesh_.points);
     write(state_.v, geometry.velocity, std::vector<Point>(size()));
@@ -279,6 +279,9 @@ private:
           scene_.file.string(), method, preconditioner);
     }
     return {.on = true, .speed = speed, .steps = scene_.solver.integer("sleep_steps")};
+  }
+  typename RigidPredictor<P, DefaultSpace>::Params rigid_predictor() const {
+    return {.on = scene_.solver.flag("rigid_predictor")};
   }
   Lagging lagging() const {
     return {scene_.contact ? scene_.contact->integer("friction_passes") : 1};
