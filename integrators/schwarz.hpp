@@ -28,8 +28,10 @@ public:
     int aggregate = 32;  ///< unknowns per aggregate: 8, 16, 24 or 32
     /// Functions of the coarse level, which is solved serially; 0: no coarse level
     int max_coarse = 1024;
-    int run = 128;  ///< unknowns in a run of the coarse level that moves in an affine way
-    int team = 0;   ///< threads per aggregate; 0: Kokkos chooses. The result is the same
+    /// Unknowns in a run of the coarse level that moves in an affine way. On small meshes, where
+    /// shorter ones cost little, runs are shorter until there are `least_runs` of them.
+    int run = 128, shortest_run = 32, least_runs = 32;
+    int team = 0;  ///< threads per aggregate; 0: Kokkos chooses. The result is the same
   };
   static constexpr char const* name = "schwarz";
 
@@ -86,7 +88,9 @@ private:
       return equal_runs(n, joined * params_.aggregate);
     }
     int const most = std::max(params_.max_coarse / CoarseFunctions<S>::most, 1);
-    int const length = std::max(params_.run, (n + most - 1) / most);
+    int const shortest = std::min(params_.shortest_run, params_.run);
+    int const wanted = std::clamp(n / std::max(params_.least_runs, 1), shortest, params_.run);
+    int const length = std::max(wanted, (n + most - 1) / most);
     if (body_of.extent_int(0) != n) return equal_runs(n, length);
     auto const of = Kokkos::create_mirror_view_and_copy(Kokkos::HostSpace(), body_of);
     return runs_of_bodies({of.data(), of.extent(0)}, length);
