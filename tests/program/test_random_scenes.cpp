@@ -1,0 +1,132 @@
+// Scenes that nobody has seen: bodies of any shape, size, stiffness and density, thrown at each
+// other and at an obstacle, with the defaults. TAUT_RANDOM_SCENES=N runs scenes 0 to N - 1 instead
+// of a few.
+#include "command_line.hpp"
+
+#include <taut/apps/program/commands.hpp>
+#include <taut/core/io/file.hpp>
+
+#include <fmt/format.h>
+#include <support/data.hpp>
+
+#include <array>
+#include <cmath>
+#include <cstdlib>
+#include <random>
+
+using namespace taut;
+using namespace taut::test;
+
+namespace {
+
+/// The same numbers wherever it runs, which distributions of the standard library do not promise.
+class Dice {
+public:
+  explicit Dice(unsigned seed) : engine_(seed) {}
+  double between(double low, double high) {
+    return low + (high - low) * double(engine_()) / double(std::mt19937::max());
+  }
+  /// As likely in every decade.
+  double decades(double low, double high) {
+    return std::pow(10, between(std::log10(low), std::log10(high)));
+  }
+  int below(int n) { return static_cast<int>(engine_() % static_cast<unsigned>(n)); }
+  template <class T, std::size_t n>
+  T one_of(std::array<T, n> const& choices) {
+    return choices[static_cast<std::size_t>(below(n))];
+  }
+
+private:
+  std::mt19937 engine_;
+};
+
+/// A shape about `size` across.
+std::string random_shape(Dice& dice, double size) {
+  switch (dice.below(6)) {
+    case 0:
+      return fmt::format("{{ kind = \"box\", size = [{}, {}, {}], resolution = {} }}",
+                         size * dice.between(0.5, 1), size * dice.between(0.3, 1),
+                         size * dice.between(0.3, 1), 2 + dice.below(3));
+    case 1:
+      return fmt::format(
+          "{{ kind = \"sheet\", length = {}, width = {}, thickness = {}, resolution = {} }}", size,
+          size, 0.06 * size, 6 + dice.below(5));
+    case 2:
+      return fmt::format("{{ kind = \"sphere\", radius = {}, resolution = {} }}", 0.4 * size,
+                         3 + dice.below(3));
+    case 3:
+      return fmt::format("{{ kind = \"torus\", radius = {}, tube_radius = {}, resolution = {} }}",
+                         0.35 * size, 0.12 * size, 2 + dice.below(2));
+    case 4:
+      return fmt::format("{{ kind = \"rod\", radius = {}, length = {}, resolution = 3 }}",
+                         0.1 * size, size);
+    default:
+      return fmt::format("{{ kind = \"letter_e\", height = {}, depth = {}, resolution = 9 }}",
+                         0.7 * size, 0.3 * size);
+  }
+}
+
+/// Bodies above each other, each thrown at the one below it.
+std::string random_scene(unsigned seed) {
+  Dice dice(seed);
+  double const size = dice.one_of<double>(std::array{0.05, 0.3, 1.0, 4.0});
+  double const step = dice.one_of<double>(std::array{0.002, 0.01, 0.02, 0.04});
+  std::string text = fmt::format(
+      "name = \"random_{}\"\ngravity = [0, -9.81, 0]\n[time]\nstep = {}\nframes = 10\n"
+      "integrator = \"{}\"\n[contact]\nfriction = {}\n",
+      seed, step, dice.below(4) == 0 ? "bdf2" : "implicit_euler",
+      dice.one_of<double>(std::array{0.0, 0.2, 0.6}));
+  if (dice.below(2) == 0) {
+    text += "[[obstacle]]\nname = \"floor\"\nshape = { kind = \"half_space\" }\n";
+  } else {
+    text += fmt::format(
+        "[[obstacle]]\nname = \"room\"\nshape = {{ kind = \"box\", inside = true, size = [{0}, "
+        "{0}, "
+        "{0}] }}\ntranslate = [0, {1}, 0]\n",
+        10 * size, 5 * size);
+  }
+  // So fast that what is highest reaches the floor in most of the steps.
+  double const fastest = 3 * size / (10 * step);
+  int const bodies = 1 + dice.below(3);
+  for (int b = 0; b < bodies; ++b) {
+    std::array const models{"stable_neo_hookean", "neo_hookean", "fixed_corotated", "arap"};
+    text += fmt::format(
+        "[[object]]\nname = \"body_{}\"\nshape = {}\nrotate = {{ axis = [{}, {}, {}], angle = {} "
+        "}}\n"
+        "translate = [{}, {}, {}]\n",
+        b, random_shape(dice, size), dice.between(-1, 1), dice.between(-1, 1), dice.between(0.1, 1),
+        dice.between(0, 360), size * dice.between(-0.2, 0.2), size * (0.8 + 1.5 * b),
+        size * dice.between(-0.2, 0.2));
+    text += fmt::format(
+        "velocity = {{ linear = [{}, {}, 0], axis = [0, {}, 1], centre = [0, {}, 0], "
+        "angular_velocity = {} }}\n",
+        fastest * dice.between(-0.2, 0.2), -fastest * dice.between(0.3, 1), dice.between(-1, 1),
+        size * (0.8 + 1.5 * b), dice.between(-200, 200) * std::min(1.0, 0.01 / step));
+    text += fmt::format("material = {{ model = \"{}\", young = {}, poisson = {}, density = {} }}\n",
+                        dice.one_of<char const*>(models), dice.decades(1e4, 1e8),
+                        dice.between(0.2, 0.45), dice.decades(100, 8000));
+  }
+  return text;
+}
+
+}  // namespace
+
+TEST_CASE("scenes that nobody has seen run clean", "[contact][scenes][random]") {
+  char const* const asked = std::getenv("TAUT_RANDOM_SCENES");
+  int const count = asked ? std::atoi(asked) : 6;
+  for (int seed = 0; seed < count; ++seed) {
+    ScratchFolder const folder;
+    std::string const text = random_scene(static_cast<unsigned>(seed));
+    CAPTURE(seed, text);
+    RunOptions options;
+    options.scene.scene = folder.write("random.toml", text).string();
+    options.out = folder.path() / "result";
+    options.check = CheckRun::every_step;
+    CHECK(run_command(options) == 0);
+    auto const summary = test::read_json(options.out / "summary.json");
+    CHECK(summary.at("ended") == "finished");
+    CHECK(summary.at("steps_converged") == 10);
+    CHECK(summary.at("intersections") == "none");
+    CHECK(summary.at("smallest_gap") > 0);
+  }
+}
