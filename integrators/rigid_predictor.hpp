@@ -152,7 +152,7 @@ private:
     for (int b = 0; b < count; ++b) {
       double const* sum = moments.data() + moment_sums * b;
       kernels::RigidBody body;
-      body.free = sum[0] > 0 && sum[1] == 0;
+      body.free = b < bodies_.connected && sum[0] > 0 && sum[1] == 0;
       any = any || body.free;
       for (int f = 0; f < 4; ++f)
         for (int c = 0; c < 3; ++c) body.centre[f][c] = body.free ? sum[2 + 3 * f + c] / sum[0] : 0;

@@ -23,6 +23,7 @@ struct Bodies {
   static constexpr int chunk_length = S::on_host ? 512 : 32;
 
   int count = 0;          ///< bodies
+  int connected = 0;      ///< those that elements connect: all, or all but the last
   int chunks = 0;         ///< of all of them
   Indices of;             ///< per unknown
   Indices chunk_begin;    ///< per body, +1: its chunks
@@ -139,6 +140,7 @@ Bodies<S> make_bodies(int n, std::span<Connectivity const> kinds) {
     chunk_begin.push_back(static_cast<int>(unknown_begin.size()) - 1);
   }
   return {count,
+          loose ? count - 1 : count,
           static_cast<int>(unknown_begin.size()) - 1,
           to_space<S>("body_of", of),
           to_space<S>("body_chunks", chunk_begin),
