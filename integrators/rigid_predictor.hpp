@@ -144,13 +144,15 @@ private:
   void start_bodies(Potential& potential, State const& state, Positions const& y) {
     prepare(potential);
     int const count = bodies_.count;
-    constexpr int moment_sums = kernels::RigidMoments<P, S>::sums;
-    auto const moments = sums_.template sum<moment_sums>(
-        "body_moments", kernels::RigidMoments<P, S>{potential.mass(), potential.fixed(), state.x, y,
-                                                    state.x_last, state.v_last, state.last_step});
+    using Moments = kernels::RigidMoments<P, S>;
+    using Turns = kernels::RigidTurns<P, S>;
+    using Remainders = kernels::RigidRemainders<P, S>;
+    auto const moments = sums_.template sum<Moments::sums>(
+        "rigid_moments", Moments{potential.mass(), potential.fixed(), state.x, y, state.x_last,
+                                 state.v_last, state.last_step});
     bool any = false;
     for (int b = 0; b < count; ++b) {
-      double const* sum = moments.data() + moment_sums * b;
+      double const* sum = moments.data() + Moments::sums * b;
       kernels::RigidBody body;
       body.free = b < bodies_.connected && sum[0] > 0 && sum[1] == 0;
       any = any || body.free;
@@ -164,18 +166,22 @@ private:
     kernels::RigidFields<P, S> const fields{potential.mass(), state.x,      y,
                                             state.x_last,     state.v_last, state.last_step,
                                             bodies_.of,       list_};
-    auto const turns = sums_.template sum<18>("body_turns", kernels::RigidTurns<P, S>{fields});
+    auto const turns = sums_.template sum<Turns::sums>("rigid_turns", Turns{fields});
     for (int b = 0; b < count; ++b) {
+      double const* sum = turns.data() + Turns::sums * b;
       Mat3<double> now, last;
-      for (int k = 0; k < 9; ++k) now.a[k] = turns[18 * b + k], last.a[k] = turns[18 * b + 9 + k];
+      for (int k = 0; k < 9; ++k) {
+        now.a[k] = sum[k];
+        last.a[k] = sum[9 + k];
+      }
       host_(b).turn = polar_rotation(now);
       host_(b).turned = polar_rotation(last);
     }
     assign_on<S>(list_, host_);
 
-    auto const rests = sums_.template sum<4>("body_rests", kernels::RigidRemainders<P, S>{fields});
+    auto const rests = sums_.template sum<Remainders::sums>("rigid_remainders", Remainders{fields});
     for (int b = 0; b < count; ++b) {
-      double const* sum = rests.data() + 4 * b;
+      double const* sum = rests.data() + Remainders::sums * b;
       constexpr double nothing = 1e-12;  // squared, of the size of the body
       host_(b).free = host_(b).free && sum[1] > nothing * sum[0];
       host_(b).keep = sum[3] > nothing * sum[0] ? std::clamp(sum[2] / sum[3], 0.0, 1.0) : 0;
@@ -186,8 +192,9 @@ private:
 
   template <class Potential>
   void prepare(Potential& potential) {
-    if (bodies_.of.extent_int(0) == potential.size()) return;
-    bodies_ = potential.bodies();
+    Bodies<S> const& bodies = potential.bodies();
+    if (bodies_.of.extent(0) > 0 && bodies_.of.data() == bodies.of.data()) return;
+    bodies_ = bodies;
     sums_ = BodySums<S, double>(bodies_, kernels::RigidTurns<P, S>::sums);
     list_ = typename kernels::RigidFields<P, S>::List("rigid_bodies", bodies_.count);
     host_ = Kokkos::create_mirror_view(list_);
