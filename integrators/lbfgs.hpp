@@ -128,6 +128,9 @@ struct LbfgsParams {
   /// Try the step of the quadratic model first; off: the unit step, which needs no p'Hp but suits
   /// only a P that is close to H^-1 in size, too.
   bool newton_step = true;
+  /// The same after a step that had to be shortened: p'Hp costs less than trying another one. Both
+  /// off: unit steps alone (HOT).
+  bool newton_after_backtracks = true;
   /// Without pairs, too, the first step tried is that of the quadratic model; off: the unit step.
   bool newton_first_step = true;
   /// Pairs are of the metric that they were made with: with a new one they are forgotten (HOT's
@@ -218,7 +221,8 @@ public:
     heading.descent = std::abs(heading.slope);  // positive definite: any descent will do
     heading.metric = double(sums[1]);
     heading.steepest = pairs_ == 0;
-    bool const by_model = heading.steepest ? params_.newton_first_step : params_.newton_step;
+    bool by_model = params_.newton_step || (params_.newton_after_backtracks && last.backtracks > 0);
+    if (heading.steepest) by_model = params_.newton_first_step;
     heading.first_length = by_model ? 0 : 1;
     return heading;
   }

@@ -24,27 +24,6 @@
 namespace taut {
 namespace kernels {
 
-/// Mass, whether anything is fixed, and first moments of x, y, x- and y-, of each body.
-template <class P, class S>
-struct RigidMoments {
-  using Positions = VectorField<typename P::position, S>;
-  static constexpr int sums = 14;
-  Array<typename P::real, S> mass;
-  FixedMask<S> fixed;
-  Positions x, y, x_last, v_last;
-  double last_step;
-  KOKKOS_FUNCTION void operator()(int i, Sums<double, sums>& sum) const {
-    double const m = double(mass(i));
-    Vec3<double> const last = load3<double>(x_last, i);
-    Vec3<double> const field[4] = {load3<double>(x, i), load3<double>(y, i), last,
-                                   last + last_step * load3<double>(v_last, i)};
-    sum[0] += m;
-    sum[1] += fixed(i) ? 1 : 0;
-    for (int f = 0; f < 4; ++f)
-      for (int c = 0; c < 3; ++c) sum[2 + 3 * f + c] += m * field[f][c];
-  }
-};
-
 /// What is known of a body: first the centres, then the rotations.
 struct RigidBody {
   bool free = false;
@@ -58,19 +37,37 @@ struct RigidFields {
   using Positions = VectorField<typename P::position, S>;
   using List = Kokkos::View<RigidBody*, typename S::memory>;
   Array<typename P::real, S> mass;
+  FixedMask<S> fixed;
   Positions x, y, x_last, v_last;
   double last_step;
   typename Bodies<S>::Indices body;
   List bodies;
 
-  /// x, y, x- or y-, less the centre of the body.
+  /// x, y, x- or y-.
+  KOKKOS_FUNCTION Vec3<double> place(int i, int which) const {
+    if (which == 0) return load3<double>(x, i);
+    if (which == 1) return load3<double>(y, i);
+    Vec3<double> const last = load3<double>(x_last, i);
+    return which == 2 ? last : last + last_step * load3<double>(v_last, i);
+  }
+  /// The same, less the centre of the body.
   KOKKOS_FUNCTION Vec3<double> offset(int i, int which) const {
-    Vec3<double> at;
-    if (which == 0) at = load3<double>(x, i);
-    if (which == 1) at = load3<double>(y, i);
-    if (which >= 2) at = load3<double>(x_last, i);
-    if (which == 3) at = at + last_step * load3<double>(v_last, i);
-    return at - bodies(body(i)).centre[which];
+    return place(i, which) - bodies(body(i)).centre[which];
+  }
+};
+
+/// Mass, whether anything is fixed, and first moments of x, y, x- and y-.
+template <class P, class S>
+struct RigidMoments : RigidFields<P, S> {
+  static constexpr int sums = 14;
+  KOKKOS_FUNCTION void operator()(int i, Sums<double, sums>& sum) const {
+    double const m = double(this->mass(i));
+    sum[0] += m;
+    sum[1] += this->fixed(i) ? 1 : 0;
+    for (int which = 0; which < 4; ++which) {
+      Vec3<double> const at = this->place(i, which);
+      for (int c = 0; c < 3; ++c) sum[2 + 3 * which + c] += m * at[c];
+    }
   }
 };
 
@@ -147,9 +144,10 @@ private:
     using Moments = kernels::RigidMoments<P, S>;
     using Turns = kernels::RigidTurns<P, S>;
     using Remainders = kernels::RigidRemainders<P, S>;
-    auto const moments = sums_.template sum<Moments::sums>(
-        "rigid_moments", Moments{potential.mass(), potential.fixed(), state.x, y, state.x_last,
-                                 state.v_last, state.last_step});
+    kernels::RigidFields<P, S> const fields{
+        potential.mass(), potential.fixed(), state.x,    y,    state.x_last,
+        state.v_last,     state.last_step,   bodies_.of, list_};
+    auto const moments = sums_.template sum<Moments::sums>("rigid_moments", Moments{fields});
     bool any = false;
     for (int b = 0; b < count; ++b) {
       double const* sum = moments.data() + Moments::sums * b;
@@ -163,9 +161,6 @@ private:
     if (!any) return;
     assign_on<S>(list_, host_);
 
-    kernels::RigidFields<P, S> const fields{potential.mass(), state.x,      y,
-                                            state.x_last,     state.v_last, state.last_step,
-                                            bodies_.of,       list_};
     auto const turns = sums_.template sum<Turns::sums>("rigid_turns", Turns{fields});
     for (int b = 0; b < count; ++b) {
       double const* sum = turns.data() + Turns::sums * b;

@@ -82,7 +82,16 @@ template <class Model, class T>
 KOKKOS_FORCEINLINE_FUNCTION T quadratic_form(EdgeState<Model, T> const& s, Mat3<T> const& d) {
   T q = T(2) * s.d.d2 * contract(s.G, gram_of_columns(d));
   if constexpr (Model::use.d22) q = q + T(4) * s.d.d22 * square(contract_columns(s.FB, d));
-  if constexpr (Model::use.d3) {
+  if constexpr (Model::use.d3 && !Model::allows_inversion) {
+    // With G = (C B^T)^T d = J D^-1 d, which the certificate of inversion_sweeps.hpp needs, too:
+    // C : dF = tr G and F : cof(dF) = ((tr G)^2 - tr G^2) / 2J.
+    Mat3<T> const G = transpose_times(s.CB, d);
+    T const trace_G = trace(G), square_of_trace = square(trace_G);
+    T const of_square = square(G(0, 0)) + square(G(1, 1)) + square(G(2, 2)) +
+                        T(2) * (G(0, 1) * G(1, 0) + G(1, 2) * G(2, 1) + G(0, 2) * G(2, 0));
+    q = q + s.d.d33 * square_of_trace +
+        (s.d.d3 * (T(1) / s.invariants.J)) * (square_of_trace - of_square);
+  } else if constexpr (Model::use.d3) {
     Vec3<T> const d0 = d.column(0), d1 = d.column(1), d2 = d.column(2);
     Vec3<T> const D1 = s.D.column(1), D2 = s.D.column(2);
     T const of_cofactor =

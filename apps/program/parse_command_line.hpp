@@ -36,6 +36,12 @@ inline std::optional<int> parse_command_line(CLI::App& app, int argc, char** arg
     fmt::print(stderr, "taut: {}\n", *message);
     return 1;
   }
+  // CLI11 would miss the command first.
+  if (std::string const word = argc > 1 ? argv[1] : "";
+      word.starts_with('-') && !app.get_option_no_throw(word.substr(0, word.find('=')))) {
+    fmt::print(stderr, "taut: {}\n", unexpected_words(program, options_of(app), {word}));
+    return 1;
+  }
   try {
     app.parse(argc, argv);
   } catch (CLI::ExtrasError const&) {

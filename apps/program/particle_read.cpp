@@ -70,9 +70,7 @@ void read_material(Section const& s, Owner& owner) {
   s.allow({"model", "young", "poisson", "density", "plasticity"});
   MaterialParameters& m = owner.material;
   m.model = s.choice("model", particle_models(), std::string(particle_models().front()));
-  m.young = s.number("young", {.min = 0, .max = 1e15, .open_min = true, .unit = "Pa"});
-  m.poisson = s.number("poisson", {.min = -1, .max = 0.5, .open_min = true, .open_max = true});
-  m.density = s.number("density", {.min = 0, .max = 1e9, .open_min = true, .unit = "kg/m^3"});
+  read_elasticity(s, m);
   if (auto const plasticity = s.section("plasticity")) {
     owner.plasticity = read_plasticity(*plasticity);
   }

@@ -6,6 +6,8 @@
 
 #include <fmt/core.h>
 
+#include <unistd.h>
+
 #include <algorithm>
 #include <csignal>
 
@@ -17,6 +19,8 @@ std::sig_atomic_t volatile interrupted = 0;
 void interrupt(int signal) {
   interrupted = signal;
   std::signal(signal, SIG_DFL);
+  static constexpr char words[] = "\ntaut: ends after this step; at once if asked again\n";
+  [[maybe_unused]] auto const written = write(STDERR_FILENO, words, sizeof words - 1);
 }
 
 /// Ctrl-C and TERM end a run after the step in progress.

@@ -42,6 +42,11 @@ Selection read_selection(Section const& parent, std::filesystem::path const& sce
 /// One object, or all copies of it.
 std::vector<SceneObject> read_object(Section const& section, Scene const& scene);
 SceneObstacle read_obstacle(Section const& section, Scene const& scene);
+/// The keys `young`, `poisson` and `density` of a material whose model is known; `base` gives those
+/// that are left out, without it none may be. Throws Error where the model has no stable rest
+/// state.
+void read_elasticity(Section const& section, MaterialParameters& material,
+                     MaterialParameters const* base = nullptr);
 /// The table `velocity` of an object.
 InitialVelocity read_velocity(Section const& section);
 /// The ways from an object to its copies, itself among them; names are NAME-0, ... if `named`.

@@ -15,26 +15,10 @@ std::vector<std::string_view> model_names() {
 /// `base` gives the keys that are left out; without it all but the model are required.
 MaterialParameters read_material(Section const& section, MaterialParameters const* base) {
   section.allow({"model", "young", "poisson", "density"});
-  auto const inherited = [&](double MaterialParameters::*member) {
-    return base ? std::optional<double>(base->*member) : std::nullopt;
-  };
   MaterialParameters material;
   material.model =
       section.choice("model", model_names(), base ? base->model : "stable_neo_hookean");
-  material.young = section.number("young", {.min = 0, .max = 1e15, .open_min = true, .unit = "Pa"},
-                                  inherited(&MaterialParameters::young));
-  material.poisson =
-      section.number("poisson", {.min = -1, .max = 0.5, .open_min = true, .open_max = true},
-                     inherited(&MaterialParameters::poisson));
-  material.density =
-      section.number("density", {.min = 0, .max = 1e9, .open_min = true, .unit = "kg/m^3"},
-                     inherited(&MaterialParameters::density));
-  // Its bulk modulus is lambda - mu / 3.
-  if (material.model == "stable_neo_hookean" && material.poisson <= 0.125)
-    throw Error(
-        "{}.poisson is {}: stable_neo_hookean has no stable rest state at or below 0.125: use "
-        "model = \"stable_neo_hookean_2018\"",
-        section.where(), material.poisson);
+  read_elasticity(section, material, base);
   return material;
 }
 
@@ -83,6 +67,26 @@ void require_start_allowed(SceneObject const& object) {
 }
 
 }  // namespace
+
+void read_elasticity(Section const& section, MaterialParameters& material,
+                     MaterialParameters const* base) {
+  auto const read = [&](char const* key, double MaterialParameters::*member, Range const& range) {
+    material.*member =
+        section.number(key, range, base ? std::optional<double>(base->*member) : std::nullopt);
+  };
+  read("young", &MaterialParameters::young,
+       {.min = 0, .max = 1e15, .open_min = true, .unit = "Pa"});
+  read("poisson", &MaterialParameters::poisson,
+       {.min = -1, .max = 0.5, .open_min = true, .open_max = true});
+  read("density", &MaterialParameters::density,
+       {.min = 0, .max = 1e9, .open_min = true, .unit = "kg/m^3"});
+  // Its bulk modulus is lambda - mu / 3.
+  if (material.model == "stable_neo_hookean" && material.poisson <= 0.125)
+    throw Error(
+        "{}.poisson is {}: stable_neo_hookean has no stable rest state at or below 0.125: use "
+        "model = \"stable_neo_hookean_2018\"",
+        section.where(), material.poisson);
+}
 
 std::span<MaterialModel const> material_models() {
   static constexpr std::array<MaterialModel, 5> models{

@@ -69,7 +69,7 @@ public:
       params.lbfgs.window = options_.integer("history");
       // A cycle is close to the inverse, in size too.
       params.lbfgs.newton_step = !hot && !multigrid();
-      params.lbfgs.newton_first_step = !hot;
+      params.lbfgs.newton_after_backtracks = params.lbfgs.newton_first_step = !hot;
       params.lbfgs.forget_when_renewed = options_.flag("forget");
       return preconditioned<Minimiser>(params, window());
     }

@@ -163,6 +163,25 @@ TEST_CASE("L-BFGS finds the minimum, with all preconditioners") {
   CHECK(toy::distance_to_minimum(chain, x) < 3e-5 * chain.scale().length);
 }
 
+TEST_CASE("after a step that had to be shortened, L-BFGS asks the model how far to go") {
+  auto const run = [](bool asks) {
+    toy::Chain<toy::Barrier> chain;
+    auto const x = chain.start();
+    ByLbfgs::Params params;
+    params.lbfgs.newton_step = false;
+    params.lbfgs.newton_after_backtracks = asks;
+    params.preconditioner = AnyPreconditioner<Fp64>::by_name("identity");
+    params.stop.tolerance = 1e-5;
+    auto const report = ByLbfgs(params).minimise(chain, x);
+    CHECK(report.converged());
+    CHECK(toy::distance_to_minimum(chain, x) < 3e-5 * chain.scale().length);
+    return report.backtracks;
+  };
+  int const asking = run(true), trying = run(false);
+  CAPTURE(asking, trying);
+  CHECK(3 * asking < 2 * trying);
+}
+
 TEST_CASE("a window that cannot be kept is refused") {
   ByLbfgs::Params params;
   params.lbfgs.window = GENERATE(0, 21);

@@ -41,7 +41,10 @@ using NumbersPcg = Pcg<P_, S_, Numbers>;
 using Gast =
     Newton<NumbersPcg, BlockJacobi, SufficientDecrease, MomentumNorm<>, P, S, MomentumForcing>;
 
-constexpr LbfgsParams hot_pairs{.window = 8, .newton_step = false, .newton_first_step = false};
+constexpr LbfgsParams hot_pairs{.window = 8,
+                                .newton_step = false,
+                                .newton_after_backtracks = false,
+                                .newton_first_step = false};
 
 HotMultigrid<P, S>::Params hot_cycle(Refresh const& refresh) {
   return {.refresh = refresh,

@@ -34,6 +34,7 @@ TEST_CASE("mistakes are answered by the nearest word, if any is near", "[cli]") 
   says("plan elephant", 1, "this name; `taut scenes`");
   says("plan --smal drag", 1, "`taut plan` has no option --smal: did you mean --small?");
   says("plan drag --resoluton=2", 1, "no option --resoluton: did you mean --resolution?");
+  says("--versio", 1, "`taut` has no option --versio: did you mean --version?");
   says("plan drag --elephant 3", 1, "no option --elephant; `taut plan --help` lists them");
   says("plan drag one more", 1, "\"one\" is a word too many for `taut plan`; `taut plan --help`");
 }

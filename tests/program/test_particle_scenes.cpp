@@ -333,6 +333,9 @@ TEST_CASE("mistakes in a scene of material points are answered by a sentence", "
   refused("kind = \"box\"", "kind = \"bowl\"", "object.cube.shape.kind is 'bowl'");
   refused("[0.4, 0.4, 0.4]", "[0.4, 0.4, 0.4], resolution = 3", "grid.spacing");
   refused("young = 1e5", "model = \"jelly\", young = 1e5", "object.cube.material.model is 'jelly'");
+  refused("young = 1e5, poisson = 0.3",
+          "model = \"stable_neo_hookean\", young = 1e5, poisson = 0.1",
+          "stable_neo_hookean has no stable rest state at or below 0.125");
   refused("young = 1e5", "plasticity = { kind = \"clay\" }, young = 1e5", "is 'clay'");
   refused("young = 1e5", "plasticity = { kind = \"von_mises\" }, young = 1e5", "yield_stress");
   refused("translate = [0, 0.2, 0]", "translate = [0, 0.1, 0]",

@@ -1,6 +1,6 @@
-// Scenes that nobody has seen: bodies of any shape, size, stiffness and density, thrown at each
-// other and at an obstacle, with the defaults. TAUT_RANDOM_SCENES=N runs scenes 0 to N - 1 instead
-// of a few.
+// Scenes that nobody has seen: bodies of any shape, size, stiffness and density, of tets or of
+// material points, thrown at each other and at an obstacle, with the defaults. TAUT_RANDOM_SCENES=N
+// runs scenes 0 to N - 1 instead of a few.
 #include "command_line.hpp"
 
 #include <taut/apps/program/commands.hpp>
@@ -117,24 +117,97 @@ std::string random_scene(unsigned seed) {
   return text;
 }
 
-}  // namespace
+/// What a material of this model may do besides.
+std::string random_plasticity(Dice& dice, std::string_view model, double young) {
+  int const kind = dice.below(4);
+  double const yield = young * dice.decades(1e-3, 1e-1);
+  double const compression = dice.decades(0.005, 0.05), angle = dice.between(20, 40);
+  if (kind == 0 && model != "hencky_plastic") return "";
+  if (kind == 1 && model != "hencky_plastic")
+    return fmt::format(
+        ", plasticity = {{ kind = \"snow\", compression = {}, stretch = {}, hardening = 10 }}",
+        compression, compression / 3);
+  if (kind == 2) return fmt::format(", plasticity = {{ kind = \"sand\", angle = {} }}", angle);
+  return fmt::format(", plasticity = {{ kind = \"von_mises\", yield_stress = {} }}", yield);
+}
 
-TEST_CASE("scenes that nobody has seen run clean", "[contact][scenes][random]") {
+/// Bodies of particles above each other, each thrown at the one below it, some eight cells thick.
+std::string random_particles(unsigned seed) {
+  Dice dice(seed);
+  double const size = dice.one_of<double>(std::array{0.05, 0.3, 1.0, 4.0});
+  double const step = dice.one_of<double>(std::array{0.002, 0.01, 0.02, 0.04});
+  std::string text = fmt::format(
+      "name = \"random_{}\"\ngravity = [0, -9.81, 0]\n[time]\nstep = {}\nframes = 4\n"
+      "[grid]\nspacing = {}\ntransfer = \"{}\"\n",
+      seed, step, size / 8, dice.one_of<char const*>(std::array{"apic", "rpic", "flip"}));
+  text += fmt::format("[[boundary]]\nname = \"floor\"\ncontact = \"{}\"\n",
+                      dice.one_of<char const*>(std::array{"stick", "slip", "separate"}));
+  text += dice.below(2) == 0 ? "shape = { kind = \"half_space\" }\n"
+                             : fmt::format(
+                                   "shape = {{ kind = \"sphere\", radius = {0}, inside = true }}\n"
+                                   "translate = [0, {0}, 0]\n",
+                                   6 * size);
+  std::array const models{"fixed_corotated", "neo_hookean", "hencky", "hencky_plastic"};
+  char const* const model = dice.one_of<char const*>(models);
+  double const fastest = 2 * size / (4 * step);
+  int const bodies = 1 + dice.below(2);
+  for (int b = 0; b < bodies; ++b) {
+    int const kind = dice.below(3);
+    std::string const shape =
+        kind == 0   ? fmt::format("{{ kind = \"box\", size = [{0}, {1}, {0}] }}", size, 0.6 * size)
+        : kind == 1 ? fmt::format("{{ kind = \"sphere\", radius = {} }}", 0.5 * size)
+                    : fmt::format("{{ kind = \"torus\", radius = {}, tube_radius = {} }}",
+                                  0.4 * size, 0.15 * size);
+    std::array const velocity{fastest * dice.between(-0.2, 0.2), -fastest * dice.between(0.3, 1)};
+    double const angle = dice.between(0, 360), spin = dice.between(-100, 100);
+    double const young = dice.decades(1e4, 1e8), poisson = dice.between(0.1, 0.45);
+    double const density = dice.decades(100, 8000), height = size * (1 + 1.8 * b);
+    text += fmt::format(
+        "[[object]]\nname = \"body_{}\"\nshape = {}\ntranslate = [0, {}, 0]\n"
+        "rotate = {{ axis = [1, 1, 0], angle = {} }}\n",
+        b, shape, height, angle);
+    text += fmt::format(
+        "velocity = {{ linear = [{}, {}, 0], centre = [0, {}, 0], angular_velocity = {} }}\n",
+        velocity[0], velocity[1], height, spin);
+    text +=
+        fmt::format("material = {{ model = \"{}\", young = {}, poisson = {}, density = {}{} }}\n",
+                    model, young, poisson, density, random_plasticity(dice, model, young));
+  }
+  return text;
+}
+
+/// Runs scenes of `make(seed)`, and has `look` judge their summaries.
+template <class Make, class Look>
+void run_random(Make const& make, CheckRun check, Look const& look) {
   char const* const asked = std::getenv("TAUT_RANDOM_SCENES");
   int const count = asked ? std::atoi(asked) : 6;
   for (int seed = 0; seed < count; ++seed) {
     ScratchFolder const folder;
-    std::string const text = random_scene(static_cast<unsigned>(seed));
+    std::string const text = make(static_cast<unsigned>(seed));
     CAPTURE(seed, text);
     RunOptions options;
     options.scene.scene = folder.write("random.toml", text).string();
     options.out = folder.path() / "result";
-    options.check = CheckRun::every_step;
+    options.check = check;
     CHECK(run_command(options) == 0);
     auto const summary = test::read_json(options.out / "summary.json");
     CHECK(summary.at("ended") == "finished");
-    CHECK(summary.at("steps_converged") == 10);
+    CHECK(summary.at("steps_converged") == summary.at("frames_asked"));
+    look(summary);
+  }
+}
+
+}  // namespace
+
+TEST_CASE("scenes that nobody has seen run clean", "[contact][scenes][random]") {
+  run_random(random_scene, CheckRun::every_step, [](auto const& summary) {
     CHECK(summary.at("intersections") == "none");
     CHECK(summary.at("smallest_gap") > 0);
-  }
+  });
+}
+
+TEST_CASE("scenes of material points that nobody has seen run clean",
+          "[particles][scenes][random]") {
+  run_random(random_particles, CheckRun::off,
+             [](auto const& summary) { CHECK(summary.at("most_inverted_elements") == 0); });
 }
