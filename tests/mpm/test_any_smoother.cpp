@@ -109,7 +109,7 @@ TEST_CASE("the power rule finds the largest eigenvalue", "[smoother]") {
 
 TEST_CASE("cycles of symmetric smoothers are metrics, and the others are not symmetric",
           "[smoother]") {
-  auto const places = reached(5);
+  auto const places = reached(5, 3);
   std::vector<std::uint8_t> fixed;
   for (Place const& p : places) fixed.push_back(p[0] <= -3);
   Sample<Case<Right, double, 2>> const s(places, fixed);

@@ -10,16 +10,14 @@
 #include <taut/mpm/particle_stepper.hpp>
 
 #include <catch2/catch_template_test_macros.hpp>
-#include <catch2/matchers/catch_matchers_floating_point.hpp>
 
-#include <cmath>
+#include <algorithm>
 
 #include "particle_scenes.hpp"
 
 namespace taut {
 namespace {
 
-using Catch::Matchers::WithinAbs;
 using S = DefaultSpace;
 using P = Fp64;
 constexpr double dx = 0.1, h = 0.01;
