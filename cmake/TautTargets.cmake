@@ -36,6 +36,9 @@ target_compile_options(taut_usage INTERFACE
 # Under nvcc fmt 9 takes it that there is no constexpr, and does not compile; Eigen marks its functions for the device,
 # and warns. We use both on the host alone.
 target_compile_definitions(taut_usage INTERFACE $<$<COMPILE_LANGUAGE:CUDA>:FMT_USE_CONSTEXPR=1 EIGEN_NO_CUDA>)
+# Tests and examples instantiate more kernels than the program and run each for moments: optimising them less saves half
+# of their compile time. The library and the program, which the tests of commands start, are optimised as ever.
+set(taut_optimise_less "$<$<AND:$<COMPILE_LANGUAGE:CXX>,$<CONFIG:Release>>:-Og>")
 if(TAUT_CHECKED)
   set(sanitizers -fsanitize=address,undefined)
   target_compile_options(taut_usage INTERFACE ${sanitizers} -fno-sanitize-recover=all -fno-omit-frame-pointer -O1)
