@@ -1,11 +1,12 @@
 // The Hessian at an iterate without a matrix: the numbers of particle_operator_kernels.hpp, and a
-// block for each node of what acts on it alone (inertia, slip). What ActionLevel takes as the fine
-// level of a hierarchy: products, diagonal blocks, and the matrix of the next coarser level from
-// the particles at once. The fine matrix, too, where it is wanted.
+// block for each node of what acts on it alone (inertia, slip); a ghost penalty besides. What
+// ActionLevel takes as the fine level of a hierarchy: products, diagonal blocks, and the matrix of
+// the next coarser level from the particles at once. The fine matrix, too, where it is wanted.
 //
 // Who the particles are of is not known here: terms write the numbers (linearise).
 #pragma once
 
+#include <taut/mpm/ghost_kernels.hpp>
 #include <taut/mpm/particle_assembly.hpp>
 
 namespace taut {
@@ -39,6 +40,12 @@ public:
     fixed_ = fixed;
   }
 
+  /// Rows of a ghost penalty, times `scale`; those of before until they are told anew.
+  void set_ghosts(GhostRows<S> const& rows, double scale) {
+    ghosts_ = rows;
+    ghost_scale_ = scale;
+  }
+
   GridNodes<S> const& nodes() const { return nodes_; }
   BlockViews<K, S> const& blocks() const { return blocks_; }
   int team_size() const { return team_size_; }
@@ -51,6 +58,11 @@ public:
     using Output = kernels::OperatorProductOutput<S, T>;
     for_each<S>("operator_gather", nodes_.count,
                 kernels::GatherRows<S, T, K, 3, Output>{blocks_, partial_, {fixed_, local_, x, y}});
+    if (ghosts_.count == 0) return;
+    using Field = kernels::FreeField<S, T>;
+    for_each<S>("operator_ghosts", ghosts_.count,
+                kernels::GhostForce<S, Field>{ghosts_, {fixed_, x}, ghost_scale_});
+    spread_ghosts(y, {});
   }
   void diagonal(Blocks const& blocks) const {
     run("operator_diagonal",
@@ -59,6 +71,7 @@ public:
     for_each<S>(
         "operator_gather", nodes_.count,
         kernels::GatherRows<S, T, K, 6, Output>{blocks_, partial_, {fixed_, local_, blocks}});
+    if (ghosts_.count > 0) spread_ghosts({}, blocks);
   }
   /// `coarse`, which has its nodes already, becomes P'AP.
   template <class Embedding, class TM, int R>
@@ -68,6 +81,10 @@ public:
     mirror(coarse);
     for_each<S>("add_coarse_blocks", coarse.size(),
                 kernels::AddCoarseBlocks<S, Embedding, T, TM, R>{nodes_, fixed_, local_, coarse});
+    if (ghosts_.count == 0) return;
+    for_each<S>(
+        "add_coarse_ghosts", coarse.size(),
+        kernels::AddCoarseGhosts<S, Embedding, TM, R>{ghosts_, fixed_, ghost_scale_, coarse});
   }
   /// `matrix`, over the same nodes, becomes A, fixed nodes cut off.
   template <class TM, int R>
@@ -95,6 +112,15 @@ private:
   void add_local(GridMatrix<S, TM, R> const& matrix, List<int const> const& row_of) const {
     for_each<S>("add_node_blocks", nodes_.count,
                 kernels::AddNodeBlocks<S, T, TM, R>{local_, row_of, matrix});
+    if constexpr (R >= 2) {
+      if (ghosts_.count == 0) return;
+      for_each<S>("add_ghost_rows", nodes_.count,
+                  kernels::AddGhostRows<S, TM, R>{ghosts_, fixed_, ghost_scale_, row_of, matrix});
+    }
+  }
+  void spread_ghosts(Vectors const& to, Blocks const& blocks) const {
+    for_each<S>("spread_ghosts", nodes_.count,
+                kernels::SpreadGhosts<S, T>{ghosts_, fixed_, ghost_scale_, to, {}, blocks});
   }
   template <class TM, int R>
   static void mirror(GridMatrix<S, TM, R> const& matrix) {
@@ -118,6 +144,8 @@ private:
   int team_size_ = 1;
   List<T> numbers_, partial_;
   Blocks local_;
+  GhostRows<S> ghosts_;
+  double ghost_scale_ = 1;
 };
 
 }  // namespace taut

@@ -69,7 +69,8 @@ private:
     add_particle_term(terms_, "fixed_corotated", {lame_parameters(1e5, 0.3)});
     terms_.update(particles_, grid_.blocks(), grid_.nodes(), grid_.rest());
     return ParticlePotential(grid_.unknowns(), Inertia<P>(grid_.unknowns()),
-                             BodyForce<P>(grid_.unknowns(), {0, 0, 0}), terms_, Slip<P>());
+                             BodyForce<P>(grid_.unknowns(), {0, 0, 0}), terms_,
+                             GhostPenalty<P>({.strength = 0}), Slip<P>());
   }
 
   template <class Run>

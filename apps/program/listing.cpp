@@ -168,6 +168,10 @@ int plan_particles(Scene const& scene) {
                           yields_in_step(one.model, particles.flows[m].kind) ? "in" : "after",
                           plasticity_kinds()[static_cast<std::size_t>(particles.flows[m].kind)]));
   }
+  fmt::print("{}",
+             points.ghost_penalty > 0
+                 ? "  ghost_penalty holds nodes that particles hardly see to the body\n"
+                 : "  (no ghost_penalty: nodes that particles hardly see are as free as others)\n");
   bool const slips = std::any_of(points.boundaries.begin(), points.boundaries.end(),
                                  [](auto const& b) { return b.law != BoundaryLaw::stick; });
   fmt::print("{}",

@@ -6,6 +6,7 @@
 #include <taut/core/potential/any_terms.hpp>
 #include <taut/core/potential/potential.hpp>
 #include <taut/materials/elastic.hpp>
+#include <taut/mpm/ghost_penalty.hpp>
 #include <taut/mpm/particle_grid.hpp>
 #include <taut/mpm/particle_operator.hpp>
 #include <taut/mpm/particle_split.hpp>
@@ -107,8 +108,9 @@ private:
   std::vector<std::function<void(Array<double, DefaultSpace> const&)>> measured_;
 };
 
-using ParticlePotential = Potential<Inertia<ParticlePrecision>, BodyForce<ParticlePrecision>,
-                                    ParticleTerms, Slip<ParticlePrecision>>;
+using ParticlePotential =
+    Potential<Inertia<ParticlePrecision>, BodyForce<ParticlePrecision>, ParticleTerms,
+              GhostPenalty<ParticlePrecision>, Slip<ParticlePrecision>>;
 
 /// What ParticleBlocks are to be padded to for them.
 int particle_lanes();

@@ -217,8 +217,8 @@ std::span<std::string_view const> plasticity_kinds() { return kinds; }
 
 ParticleScene read_particle_scene(Section const& root, Scene const& scene) {
   Section const grid(root.at("grid"), "grid");
-  grid.allow({"spacing", "kernel", "transfer", "flip", "per_cell", "cfl", "crossing",
-              "longest_step", "time_error", "halvings", "seed", "check_overlap"});
+  grid.allow({"spacing", "kernel", "transfer", "flip", "per_cell", "ghost_penalty", "cfl",
+              "crossing", "longest_step", "time_error", "halvings", "seed", "check_overlap"});
   ParticleScene p;
   p.spacing = grid.number("spacing", length_range) / scene.resolution;
   constexpr std::array<std::string_view, 1> kernels{"quadratic"};
@@ -227,6 +227,7 @@ ParticleScene read_particle_scene(Section const& root, Scene const& scene) {
   p.transfer = grid.choice("transfer", transfers, p.transfer);
   p.flip = grid.number("flip", {.min = 0, .max = 1}, p.flip);
   double const per_cell = grid.number("per_cell", {.min = 0, .max = 1e3, .open_min = true}, 8.0);
+  p.ghost_penalty = grid.number("ghost_penalty", {.min = 0, .max = 1}, p.ghost_penalty);
   p.cfl = grid.number("cfl", {.min = 0, .max = 10, .open_min = true, .unit = "cells"}, p.cfl);
   p.crossing =
       grid.number("crossing", {.min = 0, .max = 10, .open_min = true, .unit = "cells"}, p.crossing);

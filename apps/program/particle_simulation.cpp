@@ -268,10 +268,11 @@ private:
     }
     ParticleTerms terms;
     add_particle_term(terms, start.materials.front().model, materials, start.flows);
+    GhostPenalty<P> const ghosts({.strength = points_.ghost_penalty});
     Point const& g = scene_.gravity;
     auto const& unknowns = grid_.unknowns();
     return ParticlePotential(unknowns, Inertia<P>(unknowns),
-                             BodyForce<P>(unknowns, {g[0], g[1], g[2]}), terms, Slip<P>());
+                             BodyForce<P>(unknowns, {g[0], g[1], g[2]}), terms, ghosts, Slip<P>());
   }
   static Observer<P, S> observer_of(IterationObserver const& observer) {
     if (!observer) return {};

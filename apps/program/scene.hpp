@@ -212,6 +212,7 @@ struct ParticleScene {
   std::string transfer = "apic";       ///< apic, rpic, flip
   double flip = 0.95;                  ///< of transfer = "flip"
   double cfl = 0.6, crossing = 1;      ///< cells (mpm/particle_stepper.hpp)
+  double ghost_penalty = 0.01;         ///< strength (mpm/ghost_penalty.hpp); 0: none
   std::optional<double> longest_step;  ///< s; a frame if not given
   std::optional<double> time_error;  ///< of a step, m; steps are as long as the above allow without
   int halvings = 10;

@@ -1,0 +1,210 @@
+// Light nodes, which particles hardly see, held to the body: a ghost penalty (Burman 2010), as
+// finite elements have it where a boundary cuts cells, here over the nodes of a grid,
+//
+//   V(x) = Sum_l 1/2 k_l |d_l - Sum_j e_lj d_j|^2,      d = x - X,
+//
+// over the light nodes l, where e extrapolates linear functions from nodes j that more is seen of,
+// and k_l is a part of what those resist with.
+//
+// Without it, motions of light nodes that the few particles around them do not see are held by no
+// more than their inertia, 1e-7 of what single nodes have where waves cross thousands of cells in a
+// step: a Hessian that no smoother and no coarser level gets right. With it, a cycle takes as many
+// iterations for stiff bodies as for soft ones. Its limit are extended B-splines (Hoellig et al.
+// 2001; Yamaguchi, Moriguchi and Terada 2021 for material points), in which light nodes are no
+// unknowns; but a term fits every minimiser, and matrices of 125 blocks a row: window and node lie
+// within 3^3 nodes, so that what w couples, on the coarser level too, is at most two nodes apart.
+//
+// Affine motions cost nothing, so that no momentum changes, linear or angular: Sum w = 0, Sum w X =
+// 0, and the torque of the forces -k w s on x is s x s = 0. What it changes in a body is of the
+// order of the error that its cut cells have already (docs/results.md). The idea of a penalty on
+// single nodes, the window, and the numbers: derived and measured here.
+#pragma once
+
+#include <taut/core/exec/scan.hpp>
+#include <taut/core/potential/unknowns.hpp>
+#include <taut/core/sparse/pattern.hpp>
+#include <taut/mpm/boundary.hpp>
+#include <taut/mpm/ghost_kernels.hpp>
+#include <taut/mpm/particle_kernels.hpp>
+
+namespace taut {
+
+struct GhostParams {
+  double strength = 0.01;  ///< of the stiffness of the nodes that are extrapolated from; 0: off
+  double share = 0.03;     ///< light is a node with less of this volume of a neighbour
+};
+
+/// The penalty as a term of the potential of a grid of quadratic splines or wider ones.
+/// ParticleStepper tells it (`update`, `hold`) what is where.
+template <class Precision_ = Mixed, class Space_ = DefaultSpace>
+class GhostPenalty {
+public:
+  using Space = Space_;
+  using Precision = Precision_;
+  using Real = typename Precision::real;
+  using Positions = VectorField<typename Precision::position, Space>;
+  using Vectors = VectorField<Real, Space>;
+  using Blocks = BlockField<Real, Space>;
+  using Matrix = BlockCsr<Space, double>;
+
+  /// Throws Error for a strength or a share that cannot be.
+  explicit GhostPenalty(GhostParams const& params = {}) : params_(params) {
+    if (!(params.strength >= 0 && params.strength <= 1) ||
+        !(params.share > 0 && params.share <= 0.5)) {
+      throw Error("ghost penalty: strength = {}, share = {}; give 0 to 1, and above 0 to 0.5",
+                  params.strength, params.share);
+    }
+  }
+
+  /// A grid is made: which node holds how much of the particles.
+  template <Spline K>
+  void update(Particles<Precision, Space> const& particles, ParticleBlocks<K, Space> const& blocks,
+              GridNodes<Space> const& nodes, Positions const& rest) {
+    rest_ = rest;
+    rows_.nodes = nodes;
+    rows_.count = 0;
+    if (params_.strength == 0) return;
+    static_assert(K::width >= 3,
+                  "taut: a ghost penalty couples nodes two apart; take quadratic splines");
+    BlockViews<K, Space> const& views = blocks.views();
+    grow(partial_, "ghost_volumes", std::size_t(BlockViews<K, Space>::nodes) * views.patches);
+    grow(volume_, "ghost_volume", std::size_t(nodes.count));
+    for_each<Space>(
+        "ghost_volumes", views.patches,
+        kernels::VolumeOfPatch<Space, Precision, K>{views, {particles, nodes.dx}, partial_});
+    using Write = kernels::WriteVolume<Space>;
+    for_each<Space>("ghost_volumes", nodes.count,
+                    kernels::GatherRows<Space, double, K, 1, Write>{views, partial_, {volume_}});
+  }
+  /// A step begins, in which these nodes are fixed.
+  void hold(Positions const& rest, Unknowns<Precision, Space> const& unknowns,
+            BoundaryList<Space> const&, double) {
+    rest_ = rest;
+    unknowns_ = unknowns;
+    ++version_;
+    int const n = unknowns.size();
+    rows_.count = 0;
+    grow(rows_.row, "ghost_row", std::size_t(n));
+    grow(rows_.begin, "ghost_begin", std::size_t(n) + 1);
+    if (params_.strength == 0 || n == 0) return;
+    kernels::IsLight<Space> const is_light{rows_.nodes, volume_, unknowns.fixed, params_.share};
+    rows_.count = exclusive_scan<Space, int>("ghost_rows", n, is_light, rows_.row);
+    std::size_t const rows = static_cast<std::size_t>(rows_.count);
+    grow(rows_.middle, "ghost_middle", rows);
+    grow(rows_.node, "ghost_node", rows);
+    grow(rows_.weight, "ghost_weight", rows);
+    grow(rows_.stiffness, "ghost_stiffness", rows);
+    grow(rows_.force, "ghost_force", rows);
+    for_each<Space>("ghost_rows", n, kernels::WriteGhostRow<Space>{is_light, rows_});
+    int const entries = exclusive_scan<Space, int>("ghost_entries", n,
+                                                   kernels::CountGhosts<Space>{rows_}, rows_.begin);
+    assign_on<Space>(Kokkos::subview(rows_.begin, Kokkos::make_pair(n, n + 1)), entries);
+    grow(rows_.entry, "ghost_entry", std::size_t(entries));
+    for_each<Space>("ghost_entries", n, kernels::ListGhosts<Space>{rows_});
+    reducer_.provide(rows_.count, 1);
+  }
+  bool empty() const { return rows_.count == 0; }
+  void begin_step(StepStart<Precision, Space> const& start) const {
+    bool const inertia = start.scale == start.time_step * start.time_step;
+    for_each<Space>("begin_ghosts", rows_.count,
+                    kernels::BeginGhosts<Space, Precision>{rows_, start, unknowns_.mass,
+                                                           params_.strength, inertia});
+  }
+  /// Light nodes that are held to others.
+  int light_nodes() const { return rows_.count; }
+  GhostRows<Space> const& rows() const { return rows_; }
+
+  double value(Positions const& x, double scale) const {
+    return scale * sum(x, {}, 0, kernels::GhostSumOf::value);
+  }
+  double change(Positions const& x, Vectors const& p, double alpha, double scale) const {
+    return scale * sum(x, p, alpha, kernels::GhostSumOf::change);
+  }
+  double quadratic_form(Positions const& x, Vectors const& p, double scale) const {
+    return scale * sum(x, p, 0, kernels::GhostSumOf::form);
+  }
+  void add_gradient(Positions const& x, double scale, FixedMask<Space> const& fixed,
+                    Vectors const& g) const {
+    add(displacement(x), scale, fixed, g, {}, {});
+  }
+  void add_gradient(Positions const& x, double scale, FixedMask<Space> const& fixed,
+                    Vectors const& g, Vectors const& diagonal) const {
+    add(displacement(x), scale, fixed, g, diagonal, {});
+  }
+  void add_gradient(Positions const& x, double scale, FixedMask<Space> const& fixed,
+                    Vectors const& g, Blocks const& blocks) const {
+    add(displacement(x), scale, fixed, g, {}, blocks);
+  }
+  template <class... Curvature>
+  double add_gradient_after(Positions const& x, Vectors const& p, double alpha, double scale,
+                            FixedMask<Space> const& fixed, Vectors const& g,
+                            Curvature const&... curvature) const {
+    add_gradient(x, scale, fixed, g, curvature...);
+    return -change(x, p, -alpha, scale);
+  }
+  void add_product(Positions const&, Vectors const& p, double scale, FixedMask<Space> const& fixed,
+                   Vectors const& hp) const {
+    add(p, scale, fixed, hp, {}, {});
+  }
+  void add_to(Matrix const& matrix, Positions const&, double scale,
+              FixedMask<Space> const& fixed) const {
+    if (empty()) return;
+    for_each<Space>("ghost_assemble", unknowns_.size(),
+                    kernels::AssembleGhosts<Space, Matrix>{rows_, fixed, scale, matrix});
+  }
+  template <class Operator>
+  void linearise(Positions const&, double scale, Operator& to) const {
+    to.set_ghosts(rows_, scale);
+  }
+  double max_step(Positions const&, Vectors const&, double at_most) const { return at_most; }
+  double max_prescribed_step(Positions const&, Vectors const&, double at_most) const {
+    return at_most;
+  }
+  /// What has no part in a row stands as the node of the row itself.
+  void elements(std::vector<Connectivity>& kinds) const {
+    constexpr int entries = GhostRows<Space>::entries;
+    auto const rows = Kokkos::make_pair(0, rows_.count);
+    auto const node = Kokkos::create_mirror_view_and_copy(
+        Kokkos::HostSpace(), Kokkos::subview(rows_.node, rows, Kokkos::ALL));
+    elements_.clear();
+    for (int r = 0; r < rows_.count; ++r) {
+      int some = -1;
+      for (int k = 0; k < entries; ++k) some = std::max(some, node(r, k));
+      if (some < 0) continue;  // nothing to extrapolate from
+      for (int k = 0; k < entries; ++k) elements_.push_back(node(r, k) < 0 ? some : node(r, k));
+    }
+    kinds.push_back({elements_, entries});
+  }
+  std::int64_t pattern_version(Positions const&) const { return version_; }
+
+private:
+  using Displacement = kernels::Displacement<Space, typename Precision::position>;
+  Displacement displacement(Positions const& x) const { return {x, rest_}; }
+
+  double sum(Positions const& x, Vectors const& p, double alpha, kernels::GhostSumOf what) const {
+    if (empty()) return 0;
+    using Kernel = kernels::GhostSum<Space, Displacement, Vectors>;
+    return double(reducer_.template sum<1>("ghost_energy", rows_.count,
+                                           Kernel{rows_, displacement(x), p, alpha, what})[0]);
+  }
+  template <class Field>
+  void add(Field const& field, double scale, FixedMask<Space> const& fixed, Vectors const& g,
+           Vectors const& diagonal, Blocks const& blocks) const {
+    if (empty()) return;
+    for_each<Space>("ghost_force", rows_.count,
+                    kernels::GhostForce<Space, Field>{rows_, field, scale});
+    for_each<Space>("ghost_gradient", unknowns_.size(),
+                    kernels::SpreadGhosts<Space, Real>{rows_, fixed, scale, g, diagonal, blocks});
+  }
+
+  GhostParams params_;
+  Unknowns<Precision, Space> unknowns_;
+  Positions rest_;
+  GhostRows<Space> rows_;
+  std::int64_t version_ = 0;
+  Kokkos::View<double*, typename Space::memory> partial_, volume_;
+  Reducer<Space, double> reducer_;
+  mutable std::vector<int> elements_;
+};
+
+}  // namespace taut
