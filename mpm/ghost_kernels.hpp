@@ -16,6 +16,7 @@ struct GhostRows {
   static constexpr int entries = 27;
   template <class T>
   using List = Kokkos::View<T, Kokkos::LayoutRight, typename S::memory>;
+  using Indices = Kokkos::View<int*, typename S::memory>;
 
   int count = 0;
   GridNodes<S> nodes;
@@ -24,9 +25,9 @@ struct GhostRows {
   List<double* [entries]> weight;  ///< their sum, and that of weight times place, is 0
   List<double*> stiffness;         ///< N/m
   List<double* [3]> force;         ///< room for a vector of each row
-  List<int*> row;                  ///< per node: that of its own, or -1
-  List<int*> begin;                ///< per node, +1: the first of its entries
-  List<int*> entry;                ///< 27 row + k
+  Indices row;                     ///< per node: that of its own, or -1
+  Indices begin;                   ///< per node, +1: the first of its entries
+  Indices entry;                   ///< 27 row + k
 
   /// Sum_k w_k field(k)
   template <class Field>
@@ -83,25 +84,40 @@ struct WriteVolume {
   }
 };
 
-/// 1 where a free node holds less than `share` of what a neighbour does.
-template <class S>
+/// What resists a motion of nodes elastically, N/m, and h^2 / m times that: about the square of how
+/// many cells a wave crosses in a step.
+template <class S, class Precision>
+struct NodeStiffness {
+  Array<typename Precision::real, S> stiffness, mass;  ///< that of all, with inertia
+  double scale;                                        ///< h^2
+  bool inertia;
+  KOKKOS_FUNCTION double elastic(int i) const {
+    double const all = double(stiffness(i));
+    return Kokkos::max(0.0, inertia ? all - double(mass(i)) / scale : all);
+  }
+  KOKKOS_FUNCTION double ratio(int i) const { return scale * elastic(i) / double(mass(i)); }
+  KOKKOS_FUNCTION void operator()(int i, double& most) const { most = Kokkos::max(most, ratio(i)); }
+};
+
+/// 1 where a free node holds less than `share` of what a neighbour does that is stiff.
+template <class S, class Precision>
 struct IsLight {
   GridNodes<S> nodes;
   Kokkos::View<double const*, typename S::memory> volume;
   FixedMask<S> fixed;
-  double share;
+  NodeStiffness<S, Precision> stiff;
+  double share, least_ratio;
   /// The node at an offset of at most 8, or -1.
   KOKKOS_FUNCTION int at(int i, int a, int b, int c) const {
     return nodes.near(nodes.leaf(i), nodes.ijk(i, 0) + a, nodes.ijk(i, 1) + b, nodes.ijk(i, 2) + c);
   }
   KOKKOS_FUNCTION int operator()(int i) const {
     if (fixed(i) != 0) return 0;
-    double most = 0;
     for (int k = 0; k < 27; ++k) {
       int const j = at(i, k / 9 - 1, k / 3 % 3 - 1, k % 3 - 1);
-      if (j >= 0) most = Kokkos::max(most, volume(j));
+      if (j >= 0 && volume(i) < share * volume(j) && stiff.ratio(j) >= least_ratio) return 1;
     }
-    return volume(i) < share * most ? 1 : 0;
+    return 0;
   }
 };
 
@@ -151,9 +167,9 @@ struct LinearExtrapolation {
 };
 
 /// Writes the row of a light node, in the place of the number of those before it; -1 to others.
-template <class S>
+template <class S, class Precision>
 struct WriteGhostRow {
-  IsLight<S> is_light;
+  IsLight<S, Precision> is_light;
   GhostRows<S> to;
 
   KOKKOS_FUNCTION void operator()(int i) const {
@@ -218,63 +234,34 @@ private:
   }
 };
 
-/// Calls visit(27 row + k) for what the rows have of node i, in a fixed order.
-template <class S, class Visit>
-KOKKOS_FORCEINLINE_FUNCTION void for_each_ghost(GhostRows<S> const& rows, int i,
-                                                Visit const& visit) {
-  auto const& nodes = rows.nodes;
-  int const x = nodes.ijk(i, 0), y = nodes.ijk(i, 1), z = nodes.ijk(i, 2);
-  for (int a = -2; a <= 2; ++a)
-    for (int b = -2; b <= 2; ++b)
-      for (int c = -2; c <= 2; ++c) {
-        int const l = nodes.near(nodes.leaf(i), x + a, y + b, z + c);
-        int const r = l >= 0 ? rows.row(l) : -1;
-        if (r < 0) continue;
-        int const u = x - rows.middle(r, 0) + 1, v = y - rows.middle(r, 1) + 1,
-                  w = z - rows.middle(r, 2) + 1;
-        if (u < 0 || u > 2 || v < 0 || v > 2 || w < 0 || w > 2) continue;
-        int const k = 9 * u + 3 * v + w;
-        if (rows.node(r, k) >= 0) visit(27 * r + k);
-      }
-}
+/// The node of entry 27 row + k, or `none`.
 template <class S>
-struct CountGhosts {
+struct NodeOfEntry {
   GhostRows<S> rows;
-  KOKKOS_FUNCTION int operator()(int i) const { return count(i); }
-  [[gnu::noinline]] KOKKOS_FUNCTION int count(int i) const {
-    int sum = 0;
-    for_each_ghost(rows, i, [&](int) { ++sum; });
-    return sum;
-  }
-};
-template <class S>
-struct ListGhosts {
-  GhostRows<S> rows;
-  KOKKOS_FUNCTION void operator()(int i) const { list(i); }
-  [[gnu::noinline]] KOKKOS_FUNCTION void list(int i) const {
-    int at = rows.begin(i);
-    for_each_ghost(rows, i, [&](int entry) { rows.entry(at++) = entry; });
+  Kokkos::View<int*, typename S::memory> bucket;
+  int none;
+  KOKKOS_FUNCTION void operator()(int e) const {
+    int const n = rows.node(e / GhostRows<S>::entries, e % GhostRows<S>::entries);
+    bucket(e) = n < 0 ? none : n;
   }
 };
 
-/// A part of the largest elastic stiffness of a node that the row takes from.
+/// So stiff that the row adds no more than a part of what resists to any free node but its own.
 template <class S, class Precision>
-struct BeginGhosts {
+struct StiffenGhosts {
   GhostRows<S> rows;
-  StepStart<Precision, S> start;
-  Array<typename Precision::real, S> mass;
+  FixedMask<S> fixed;
+  NodeStiffness<S, Precision> stiff;
   double strength;
-  bool inertia;
   KOKKOS_FUNCTION void operator()(int r) const {
-    double most = 0;
+    double least = Kokkos::Experimental::infinity_v<double>;
     for (int k = 0; k < GhostRows<S>::entries; ++k) {
       int const n = rows.node(r, k);
-      if (n < 0) continue;
-      double elastic = double(start.stiffness(n));
-      if (inertia) elastic -= double(mass(n)) / start.scale;
-      most = Kokkos::max(most, elastic);
+      double const w = rows.weight(r, k);
+      if (n < 0 || rows.row(n) == r || w == 0 || fixed(n) != 0) continue;
+      least = Kokkos::min(least, stiff.elastic(n) / (w * w));
     }
-    rows.stiffness(r) = strength * most;
+    rows.stiffness(r) = least < Kokkos::Experimental::infinity_v<double> ? strength * least : 0;
   }
 };
 
@@ -402,6 +389,7 @@ struct AddCoarseGhosts {
   KOKKOS_FUNCTION void operator()(int i) const { row(i); }
   [[gnu::noinline]] KOKKOS_FUNCTION void row(int i) const {
     int const at[3] = {coarse.nodes.ijk(i, 0), coarse.nodes.ijk(i, 1), coarse.nodes.ijk(i, 2)};
+    if (!reached(at)) return;
     constexpr int reach = r + 2;
     for (int a = -reach; a <= reach; ++a)
       for (int b = -reach; b <= reach; ++b)
@@ -413,6 +401,16 @@ struct AddCoarseGhosts {
   }
 
 private:
+  /// Whether a row has to do with a node that the coarse one moves.
+  KOKKOS_FUNCTION bool reached(int const (&at)[3]) const {
+    for (int a = -r; a <= r; ++a)
+      for (int b = -r; b <= r; ++b)
+        for (int c = -r; c <= r; ++c) {
+          int const f = rows.nodes.node(2 * at[0] + a, 2 * at[1] + b, 2 * at[2] + c);
+          if (f >= 0 && rows.begin(f) < rows.begin(f + 1)) return true;
+        }
+    return false;
+  }
   KOKKOS_FUNCTION void add(int i, int const (&at)[3], int g) const {
     // P' w, on the coarse nodes from `low` on.
     int low[3], own[3];

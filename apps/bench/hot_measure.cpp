@@ -70,7 +70,7 @@ private:
     terms_.update(particles_, grid_.blocks(), grid_.nodes(), grid_.rest());
     return ParticlePotential(grid_.unknowns(), Inertia<P>(grid_.unknowns()),
                              BodyForce<P>(grid_.unknowns(), {0, 0, 0}), terms_,
-                             GhostPenalty<P>({.strength = 0}), Slip<P>());
+                             GhostPenalty<K, P>({.strength = 0}), Slip<P>());
   }
 
   template <class Run>

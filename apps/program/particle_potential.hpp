@@ -110,7 +110,7 @@ private:
 
 using ParticlePotential =
     Potential<Inertia<ParticlePrecision>, BodyForce<ParticlePrecision>, ParticleTerms,
-              GhostPenalty<ParticlePrecision>, Slip<ParticlePrecision>>;
+              GhostPenalty<ParticleKernel, ParticlePrecision>, Slip<ParticlePrecision>>;
 
 /// What ParticleBlocks are to be padded to for them.
 int particle_lanes();

@@ -268,7 +268,7 @@ private:
     }
     ParticleTerms terms;
     add_particle_term(terms, start.materials.front().model, materials, start.flows);
-    GhostPenalty<P> const ghosts({.strength = points_.ghost_penalty});
+    GhostPenalty<ParticleKernel, P> const ghosts({.strength = points_.ghost_penalty});
     Point const& g = scene_.gravity;
     auto const& unknowns = grid_.unknowns();
     return ParticlePotential(unknowns, Inertia<P>(unknowns),

@@ -26,7 +26,7 @@ template <class Precision, class Space>
 struct Held {
   using C = test::Combination<FixedCorotated, FullProjection, QuadraticSpline, Precision, Space,
                               Space::on_host>;
-  using Term = GhostPenalty<Precision, Space>;
+  using Term = GhostPenalty<QuadraticSpline, Precision, Space>;
   using T = typename Precision::real;
   test::Problem<C> problem;
   Unknowns<Precision, Space> unknowns;
@@ -34,7 +34,7 @@ struct Held {
   Term term;
   double scale = 0.01;
 
-  explicit Held(GhostParams const& params = {.strength = 0.1, .share = 0.2})
+  explicit Held(GhostParams const& params = {.strength = 0.1, .share = 0.2, .ratio = 1})
       : unknowns(std::vector<double>(problem.scene.nodes(), 0.002), problem.dx),
         resists("resists", problem.scene.nodes()),
         term(params) {
@@ -143,7 +143,14 @@ void check_term(double eps) {
     // Linear functions are extrapolated as they are.
     CHECK_THAT(sum, WithinAbs(0, 1e-12));
     CHECK_THAT(norm(first), WithinAbs(0, 1e-12));
-    CHECK(row.stiffness >= 0.1 * (1e4 - 0.2));
+    double least = std::numeric_limits<double>::infinity();
+    for (std::size_t k = 0; k < row.node.size(); ++k) {
+      int const j = row.node[k];
+      if (j == row.own || fixed(j) != 0 || row.weight[k] == 0) continue;
+      double const resists = 1e4 * (1 + j % 5) - 0.002 / 0.01;
+      least = std::min(least, resists / (row.weight[k] * row.weight[k]));
+    }
+    CHECK_THAT(row.stiffness, WithinRel(0.1 * least, 1e-4));
   }
   REQUIRE(known > 50);
   REQUIRE(known == term.light_nodes());
@@ -174,9 +181,9 @@ void check_term(double eps) {
   CHECK_THAT(term.value(x, scale), WithinRel(value, eps));
   CHECK_THAT(term.quadratic_form(x, p, scale), WithinRel(form, eps));
   CHECK_THAT(term.change(x, p, 0.3, scale), WithinRel(0.3 * slope + 0.045 * form, 10 * eps));
-  using Vectors = typename GhostPenalty<Precision, Space>::Vectors;
+  using Vectors = typename GhostPenalty<QuadraticSpline, Precision, Space>::Vectors;
   Vectors const g1("g", n), g2("g", n), d2("d", n), g3("g", n), y("y", n);
-  typename GhostPenalty<Precision, Space>::Blocks const b3("b", n);
+  typename GhostPenalty<QuadraticSpline, Precision, Space>::Blocks const b3("b", n);
   term.add_gradient(x, scale, problem.fixed, g1);
   CHECK_THAT(term.add_gradient_after(x, p, 0.3, scale, problem.fixed, g2, d2),
              WithinRel(0.3 * slope - 0.045 * form, 10 * eps));
@@ -213,7 +220,7 @@ TEST_CASE("affine motions cost nothing, and no motion turns or pushes the body",
   Field affine(n);
   Mat3<double> const A{{1.3, 0.2, -0.4, 0.1, 0.7, 0.3, 0.5, -0.6, 1.1}};
   for (int i = 0; i < n; ++i) affine[i] = A * rest[i] + Vec3<double>{3, -2, 1};
-  using Term = GhostPenalty<Fp64, S>;
+  using Term = GhostPenalty<QuadraticSpline, Fp64, S>;
   double const some = term.value(held.problem.x, 1);
   CHECK(term.value(test::field_of<Term::Positions>(affine), 1) < 1e-18 * some * n * n);
 
@@ -232,7 +239,6 @@ TEST_CASE("affine motions cost nothing, and no motion turns or pushes the body",
   CHECK(norm(push) < 1e-13 * forces);
   CHECK(norm(torque) < 1e-13 * torques);
 }
-
 
 TEST_CASE("what holds light nodes is part of the operator and of all its matrices",
           "[mpm][ghost]") {
@@ -356,7 +362,7 @@ Fall fall(double young, double strength) {
   }
   Particles<P, S> const particles(list);
   ParticleGrid<QuadraticSpline, P> grid(dx, Solid::lanes);
-  GhostPenalty<P> const ghosts({.strength = strength});
+  GhostPenalty<QuadraticSpline, P> const ghosts({.strength = strength});
   Potential scene(grid.unknowns(), Inertia<P>(grid.unknowns()),
                   BodyForce<P>(grid.unknowns(), {0, -9.81, 0}),
                   Solid({lame_parameters(young, 0.3)}), ghosts);
@@ -370,7 +376,7 @@ Fall fall(double young, double strength) {
     CHECK(report.minimiser.converged());
     CHECK(report.halvings == 0);
     end.iterations += report.minimiser.iterations;
-    end.light = std::max(end.light, scene.term<GhostPenalty<P>>().light_nodes());
+    end.light = std::max(end.light, scene.term<GhostPenalty<QuadraticSpline, P>>().light_nodes());
   }
   end.particles = particles.read();
   return end;
@@ -399,6 +405,7 @@ TEST_CASE("a penalty that cannot be is refused", "[mpm][ghost]") {
   CHECK_THROWS_WITH(GhostPenalty<>({.strength = -1}),
                     ContainsSubstring("ghost penalty: strength = -1"));
   CHECK_THROWS_WITH(GhostPenalty<>({.share = 0}), ContainsSubstring("share = 0"));
+  CHECK_THROWS_WITH(GhostPenalty<>({.ratio = -2}), ContainsSubstring("ratio = -2"));
 }
 
 }  // namespace
