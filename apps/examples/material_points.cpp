@@ -4,6 +4,7 @@
 #include <taut/integrators/time_stepper.hpp>
 #include <taut/materials/models.hpp>
 #include <taut/mpm/elastic_particles.hpp>
+#include <taut/mpm/ghost_penalty.hpp>
 #include <taut/mpm/particle_stepper.hpp>
 #include <taut/mpm/sampling.hpp>
 #include <taut/mpm/slip.hpp>
@@ -25,7 +26,7 @@ int main() {
   ParticleGrid<> grid(dx, Solid::lanes);
   Potential scene(grid.unknowns(), Inertia(grid.unknowns()),
                   BodyForce(grid.unknowns(), {0, -9.81, 0}), Solid({lame_parameters(1e5, 0.3)}),
-                  Slip<>());
+                  GhostPenalty<>(), Slip<>());
   // Its frame's y axis points out of the solid: to the right.
   BoundaryList<DefaultSpace> walls(
       {{.name = "floor", .contact = BoundaryContact::separate},

@@ -5,6 +5,7 @@
 #include <taut/materials/hencky.hpp>
 #include <taut/materials/models.hpp>
 #include <taut/mpm/elastic_particles.hpp>
+#include <taut/mpm/ghost_penalty.hpp>
 #include <taut/mpm/particle_multigrid.hpp>
 #include <taut/mpm/particle_stepper.hpp>
 #include <taut/mpm/slip.hpp>
@@ -15,6 +16,7 @@ using Points = ElasticParticles<Elastic<StableNeoHookean>>;
 template class taut::ElasticParticles<Elastic<StableNeoHookean>>;
 template class taut::ElasticParticles<Elastic<NeoHookean>, CubicSpline, Fp64>;
 template class taut::ElasticParticles<Hencky>;
+template class taut::GhostPenalty<>;
 template class taut::Slip<>;
 
 using Stepper = ParticleStepper<ImplicitEuler<Ncg<DaiKou, BlockJacobi>>>;
@@ -23,5 +25,5 @@ template auto Stepper::step(Potential<Inertia<>, Points>&, Stepper::Grid&, Parti
 
 using Projected = ElasticParticles<Elastic<FixedCorotated, FullProjection>>;
 template class taut::ParticleMultigrid<>;
-template void ParticleMultigrid<>::update(Potential<Inertia<>, Projected, Slip<>>&,
+template void ParticleMultigrid<>::update(Potential<Inertia<>, Projected, GhostPenalty<>, Slip<>>&,
                                           VectorField<double, DefaultSpace> const&);
