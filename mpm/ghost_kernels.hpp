@@ -15,7 +15,7 @@ template <class S>
 struct GhostRows {
   static constexpr int entries = 27;
   template <class T>
-  using List = Kokkos::View<T, Kokkos::LayoutRight, typename S::memory>;
+  using List = Kokkos::View<T, typename S::layout, typename S::memory>;
   using Indices = Kokkos::View<int*, typename S::memory>;
 
   int count = 0;

@@ -56,14 +56,13 @@ public:
   using Blocks = BlockField<Real, Space>;
   using Matrix = BlockCsr<Space, double>;
 
-  /// Throws Error for a strength or a share that cannot be.
+  /// Throws Error for numbers that are out of range.
   explicit GhostPenalty(GhostParams const& params = {}) : params_(params) {
     if (!(params.strength >= 0 && params.strength <= 1) ||
         !(params.share > 0 && params.share <= 0.5) || !(params.ratio >= 0)) {
       throw Error(
-          "ghost penalty: strength = {}, share = {}, ratio = {}; give 0 to 1, above 0 to 0.5, and "
-          "0 "
-          "or more",
+          "ghost penalty: strength = {}, share = {}, ratio = {}; give 0 to 1, above 0 to 0.5, "
+          "and 0 or more",
           params.strength, params.share, params.ratio);
     }
   }
@@ -76,12 +75,13 @@ public:
     rest_ = rest;
     rows_.nodes = nodes;
   }
-  /// A step begins, in which these nodes are fixed.
+  /// These nodes are fixed in the step.
   void hold(Positions const&, Unknowns<Precision, Space> const& unknowns,
             BoundaryList<Space> const&, double) {
     unknowns_ = unknowns;
   }
   bool empty() const { return params_.strength == 0; }
+  /// Finds the light nodes, where the step is long for what is stiff.
   void begin_step(StepStart<Precision, Space> const& start) const {
     ++version_;
     rows_.count = 0;
@@ -159,7 +159,7 @@ public:
   double max_prescribed_step(Positions const&, Vectors const&, double at_most) const {
     return at_most;
   }
-  /// What has no part in a row stands as the node of the row itself.
+  /// What has no part in a row stands as another node of it.
   void elements(std::vector<Connectivity>& kinds) const {
     constexpr int entries = GhostRows<Space>::entries;
     auto const rows = Kokkos::make_pair(0, rows_.count);

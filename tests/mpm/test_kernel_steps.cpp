@@ -20,7 +20,6 @@ namespace {
 
 using S = DefaultSpace;
 using P = Fp64;
-constexpr double dx = 0.1, h = 0.01;
 
 template <Spline K>
 struct Kernel {
@@ -33,6 +32,7 @@ struct Kernel {
 };
 
 struct End {
+  static constexpr double dx = 0.1;
   std::vector<Particle> particles;
   int iterations = 0;
 };
@@ -41,6 +41,7 @@ struct End {
 template <Spline K, class Minimiser>
 End drop(typename Minimiser::Params const& params) {
   using Solid = ElasticParticles<Elastic<FixedCorotated, FullProjection>, K, P>;
+  constexpr double dx = End::dx, h = 0.01;
   std::vector<Particle> list = test::jittered_block(6, 2, dx, {-2.3, 0.7, 4.6});
   for (Particle& p : list) {
     p.F = identity3<double>();
@@ -83,7 +84,7 @@ TEMPLATE_TEST_CASE("every kernel composes with the cycle, and minimisers agree o
   }
   CHECK(moved > 3);        // it has met the floor,
   CHECK(strained > 1e-3);  // is dented,
-  CHECK(apart < 1e-5 * dx);
+  CHECK(apart < 1e-5 * End::dx);
   CHECK(2 * cycle.iterations < plain.iterations);
 }
 
