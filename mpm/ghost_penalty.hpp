@@ -37,7 +37,7 @@ struct GhostParams {
   double share = 0.03;     ///< light is a node that holds less than this of a neighbour's volume
   /// Where h^2 k / m of that neighbour, with k what resists it elastically, is as large: about the
   /// square of how many cells a wave crosses in a step. Below, inertia is enough.
-  double ratio = 2e3;
+  double ratio = 50;
 };
 
 /// The penalty as a term of the potential of a grid of quadratic splines or wider ones.
