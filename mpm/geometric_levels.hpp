@@ -6,9 +6,10 @@
 //   A_l = sum_p m_p w^l_p + sum_p G^l_p' K_p G^l_p,
 //
 // with the numbers K_p of particle_operator_kernels.hpp, which know no grid but through the
-// spacing: K_p goes with 1 / dx^2. Levels hang together by linear embedding, but A_l is not the
-// P'AP of the finer one, so a cycle is symmetric, and not always smaller than the inverse: it may
-// even be indefinite, which minimisers meet as a direction that does not descend.
+// spacing: K_p goes with 1 / dx^2. (Nor do they know of a ghost penalty, which is in A_0.) Levels
+// hang together by linear embedding, but A_l is not the P'AP of the finer one, so a cycle is
+// symmetric, and not always smaller than the inverse: it may even be indefinite, which minimisers
+// meet as a direction that does not descend.
 //
 // Boundaries are not known here: a coarse node is fixed where the finer level is at its place
 // (where that has no node, where the nearest ones are). What else acts on single nodes

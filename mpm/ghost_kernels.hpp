@@ -88,14 +88,14 @@ struct WriteVolume {
 /// many cells a wave crosses in a step.
 template <class S, class Precision>
 struct NodeStiffness {
-  Array<typename Precision::real, S> stiffness, mass;  ///< that of all, with inertia
-  double scale;                                        ///< h^2
+  Array<typename Precision::real, S> stiffness, mass;  ///< that of all, with inertia if `inertia`
+  double square;                                       ///< h^2
   bool inertia;
   KOKKOS_FUNCTION double elastic(int i) const {
     double const all = double(stiffness(i));
-    return Kokkos::max(0.0, inertia ? all - double(mass(i)) / scale : all);
+    return Kokkos::max(0.0, inertia ? all - double(mass(i)) / square : all);
   }
-  KOKKOS_FUNCTION double ratio(int i) const { return scale * elastic(i) / double(mass(i)); }
+  KOKKOS_FUNCTION double ratio(int i) const { return square * elastic(i) / double(mass(i)); }
   KOKKOS_FUNCTION void operator()(int i, double& most) const { most = Kokkos::max(most, ratio(i)); }
 };
 

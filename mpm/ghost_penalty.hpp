@@ -16,8 +16,11 @@
 // unknowns; but a term fits every minimiser, and matrices of 125 blocks a row: window and node lie
 // within 3^3 nodes, so that what w couples, on the coarser level too, is at most two nodes apart.
 //
-// Affine motions cost nothing, so that no momentum changes, linear or angular: Sum w = 0, Sum w X =
-// 0, and the torque of the forces -k w s on x is s x s = 0. What it changes in a body is of the
+// Affine motions cost nothing, so that where no node is fixed no momentum changes, linear or
+// angular: Sum w = 0, Sum w X = 0, and the torque of the forces -k w s on x is s x s = 0. Fixed
+// nodes are extrapolated from, but are no reason to hold others. A light node in a wall that slips
+// or separates (slip.hpp) goes with the body more than with the wall; those further in are held
+// back by it as ever. What it changes in a body is of the
 // order of the error that its cut cells have already (docs/results.md). The idea of a penalty on
 // single nodes, the window, and the numbers: derived and measured here.
 #pragma once
@@ -29,6 +32,8 @@
 #include <taut/mpm/boundary.hpp>
 #include <taut/mpm/ghost_kernels.hpp>
 #include <taut/mpm/particle_kernels.hpp>
+
+#include <limits>
 
 namespace taut {
 
@@ -74,6 +79,8 @@ public:
     blocks_ = blocks.views();
     rest_ = rest;
     rows_.nodes = nodes;
+    rows_.count = 0;
+    ++version_;
   }
   /// These nodes are fixed in the step.
   void hold(Positions const&, Unknowns<Precision, Space> const& unknowns,
@@ -87,8 +94,7 @@ public:
     rows_.count = 0;
     int const n = unknowns_.size();
     kernels::NodeStiffness<Space, Precision> const stiff{
-        start.stiffness, unknowns_.mass, start.scale,
-        start.scale == start.time_step * start.time_step};
+        start.stiffness, unknowns_.mass, start.time_step * start.time_step, start.has_inertia};
     if (empty() || maximum<Space>("stiffest_node", n, 0.0, stiff) < params_.ratio) return;
     find_volumes();
     grow(rows_.row, "ghost_row", std::size_t(n));
@@ -96,6 +102,10 @@ public:
                                                       stiff,       params_.share, params_.ratio};
     rows_.count = exclusive_scan<Space, int>("ghost_rows", n, is_light, rows_.row);
     if (rows_.count == 0) return;
+    if (rows_.count > most_rows) {
+      throw Error("ghost penalty: {} light nodes are more than {}; take a coarser grid",
+                  rows_.count, most_rows);
+    }
     std::size_t const rows = static_cast<std::size_t>(rows_.count);
     grow(rows_.middle, "ghost_middle", rows);
     grow(rows_.node, "ghost_node", rows);
@@ -162,9 +172,7 @@ public:
   /// What has no part in a row stands as another node of it.
   void elements(std::vector<Connectivity>& kinds) const {
     constexpr int entries = GhostRows<Space>::entries;
-    auto const rows = Kokkos::make_pair(0, rows_.count);
-    auto const node = Kokkos::create_mirror_view_and_copy(
-        Kokkos::HostSpace(), Kokkos::subview(rows_.node, rows, Kokkos::ALL));
+    auto const node = Kokkos::create_mirror_view_and_copy(Kokkos::HostSpace(), rows_.node);
     elements_.clear();
     for (int r = 0; r < rows_.count; ++r) {
       int some = -1;
@@ -177,6 +185,10 @@ public:
   std::int64_t pattern_version(Positions const&) const { return version_; }
 
 private:
+  /// Entries are counted by int, with room for some more.
+  static constexpr int most_rows =
+      std::numeric_limits<int>::max() / (2 * GhostRows<Space>::entries);
+
   void find_volumes() const {
     int const n = rows_.nodes.count;
     grow(partial_, "ghost_volumes", std::size_t(BlockViews<K, Space>::nodes) * blocks_.patches);

@@ -1,7 +1,7 @@
 // How a potential over particles is split for ADMM (integrators/admm.hpp): deformation gradients
-// are copied (particle_split.hpp), inertia and all that acts on single nodes stays. The operator is
-// M + h^2 Sum_p V_p k_p D_p' D_p, with D_p x = F_p(x), matrix-free, and its preconditioner a cycle
-// of multigrid that is built once per minimisation.
+// are copied (particle_split.hpp), inertia, all that acts on single nodes and a ghost penalty stay.
+// The operator is M + h^2 Sum_p V_p k_p D_p' D_p, with D_p x = F_p(x), matrix-free, and its
+// preconditioner a cycle of multigrid that is built once per minimisation.
 #pragma once
 
 #include <taut/core/report/error.hpp>
@@ -36,6 +36,7 @@ public:
     first_ = true;
     local_ = local_memory_.resize("split_local", e.size());
     // Blocks of what acts on nodes alone; the numbers are then replaced.
+    operator_.set_ghosts({}, 1);  // unless a term has some
     e.linearise(x, operator_, local_);
     bool found = false;
     e.for_each_term([&](auto& term) {

@@ -315,8 +315,8 @@ public:
       for_each_of<is_stepped>([&](auto const& term) { anyone = anyone || !holds_nothing(term); });
       if (!anyone) return;
       auto const stiffness = stiffness_of_untold(x);  // and their gradient, in direction_
-      StepStart<Precision, Space> const start{x,          time_step, stiffness,
-                                              direction_, scale_,    mass / size()};
+      StepStart<Precision, Space> const start{x,      time_step,     stiffness,  direction_,
+                                              scale_, mass / size(), has_inertia};
       for_each_of<is_stepped>([&](auto const& term) { term.begin_step(start); });
     }
   }

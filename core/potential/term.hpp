@@ -90,6 +90,7 @@ struct StepStart {
   VectorField<typename Precision::real, S> gradient = {};
   double scale = 0;      ///< h^2, or 1 where there is no inertia
   double mean_mass = 0;  ///< of an unknown, kg
+  bool has_inertia = true;
 };
 
 /// A term that is told when a step begins. It may then become another function of x, and must not
