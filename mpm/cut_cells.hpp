@@ -31,8 +31,7 @@ namespace kernels {
 /// Neighbour k of 27 of a node, or -1.
 template <class S>
 KOKKOS_FORCEINLINE_FUNCTION int neighbour(GridNodes<S> const& nodes, int i, int k) {
-  return nodes.near(nodes.leaf(i), nodes.ijk(i, 0) + k / 9 - 1, nodes.ijk(i, 1) + k / 3 % 3 - 1,
-                    nodes.ijk(i, 2) + k % 3 - 1);
+  return nodes.beside(i, k / 9 - 1, k / 3 % 3 - 1, k % 3 - 1);
 }
 
 /// 1 where a free node is cut.

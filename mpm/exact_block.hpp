@@ -26,10 +26,8 @@ struct ExactRow {
 
   KOKKOS_FUNCTION int column(int i, int k) const {
     constexpr int width = 2 * radius + 1;
-    GridNodes<S> const& nodes = rows.nodes;
-    int const j = nodes.near(nodes.leaf(i), nodes.ijk(i, 0) + k / (width * width) - radius,
-                             nodes.ijk(i, 1) + k / width % width - radius,
-                             nodes.ijk(i, 2) + k % width - radius);
+    int const j = rows.nodes.beside(i, k / (width * width) - radius, k / width % width - radius,
+                                    k % width - radius);
     return j < 0 ? -1 : part(j);
   }
   KOKKOS_FUNCTION int count(int i) const {

@@ -107,14 +107,10 @@ struct IsLight {
   FixedMask<S> fixed;
   NodeStiffness<S, Precision> stiff;
   double share, least_ratio;
-  /// The node at an offset of at most 8, or -1.
-  KOKKOS_FUNCTION int at(int i, int a, int b, int c) const {
-    return nodes.near(nodes.leaf(i), nodes.ijk(i, 0) + a, nodes.ijk(i, 1) + b, nodes.ijk(i, 2) + c);
-  }
   KOKKOS_FUNCTION int operator()(int i) const {
     if (fixed(i) != 0) return 0;
     for (int k = 0; k < 27; ++k) {
-      int const j = at(i, k / 9 - 1, k / 3 % 3 - 1, k % 3 - 1);
+      int const j = nodes.beside(i, k / 9 - 1, k / 3 % 3 - 1, k % 3 - 1);
       if (j >= 0 && volume(i) < share * volume(j) && stiff.ratio(j) >= least_ratio) return 1;
     }
     return 0;
@@ -186,8 +182,8 @@ struct WriteGhostRow {
     for (int c = 0; c < 3; ++c) to.middle(r, c) = is_light.nodes.ijk(i, c) + shift[c];
     double most = 0;
     for (int k = 0; k < 27; ++k) {
-      to.node(r, k) =
-          is_light.at(i, shift[0] + k / 9 - 1, shift[1] + k / 3 % 3 - 1, shift[2] + k % 3 - 1);
+      to.node(r, k) = is_light.nodes.beside(i, shift[0] + k / 9 - 1, shift[1] + k / 3 % 3 - 1,
+                                            shift[2] + k % 3 - 1);
       if (to.node(r, k) >= 0) most = Kokkos::max(most, volume(to.node(r, k)));
     }
     Vec3<double> const from{double(shift[0]), double(shift[1]), double(shift[2])};
@@ -223,7 +219,7 @@ private:
     Vec3<double> pull{0, 0, 0};
     for (int k = 0; k < 27; ++k) {
       Vec3<double> const at = place_in_window(k);
-      int const j = is_light.at(i, int(at[0]), int(at[1]), int(at[2]));
+      int const j = is_light.nodes.beside(i, int(at[0]), int(at[1]), int(at[2]));
       if (j >= 0) pull = pull + is_light.volume(j) * at;
     }
     double most = 0;

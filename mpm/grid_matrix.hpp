@@ -256,8 +256,7 @@ struct CutOffFixed {
     for (int dx = -radius; dx <= radius; ++dx)
       for (int dy = -radius; dy <= radius; ++dy)
         for (int dz = -radius; dz <= radius; ++dz) {
-          int const j = a.nodes.near(a.nodes.leaf(i), a.nodes.ijk(i, 0) + dx,
-                                     a.nodes.ijk(i, 1) + dy, a.nodes.ijk(i, 2) + dz);
+          int const j = a.nodes.beside(i, dx, dy, dz);
           if (j >= 0 && j != i && (fixed(i) != 0 || fixed(j) != 0)) {
             a.set(i, dx, dy, dz, Mat3<T>{});
           }

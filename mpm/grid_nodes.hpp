@@ -82,6 +82,10 @@ struct GridNodes {
     int const found = leaf_near(l, i, j, k);
     return found < 0 ? -1 : in_leaf(found, i, j, k);
   }
+  /// The number of the node at (i, j, k) from node n, each at most 8, or -1 if it is not active.
+  KOKKOS_FUNCTION int beside(int n, int i, int j, int k) const {
+    return near(leaf(n), ijk(n, 0) + i, ijk(n, 1) + j, ijk(n, 2) + k);
+  }
 };
 
 }  // namespace taut

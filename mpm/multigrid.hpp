@@ -36,8 +36,7 @@ struct SpreadRow {
     for (int dx = -radius; dx <= radius; ++dx)
       for (int dy = -radius; dy <= radius; ++dy)
         for (int dz = -radius; dz <= radius; ++dz) {
-          int const j = a.nodes.near(a.nodes.leaf(i), a.nodes.ijk(i, 0) + dx,
-                                     a.nodes.ijk(i, 1) + dy, a.nodes.ijk(i, 2) + dz);
+          int const j = a.nodes.beside(i, dx, dy, dz);
           if (j < 0) continue;
           Mat3<T> const b = a.block(i, dx, dy, dz);
           for (int r = 0; r < 3; ++r)

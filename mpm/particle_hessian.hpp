@@ -20,9 +20,7 @@ public:
   }
   template <class E>
   void update(E& e, VectorField<typename P::position, S> const& x) {
-    operator_.set_ghosts({}, 1);  // unless a term has some
-    e.linearise(x, operator_, local_);
-    operator_.set_local(local_, e.fixed());
+    operator_.linearise(e, x, local_);
     if constexpr (assembled) {
       matrix_.resize(operator_.nodes());
       operator_.matrix(matrix_);

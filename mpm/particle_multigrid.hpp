@@ -98,9 +98,7 @@ public:
     Strengthening const& strong = params_.strengthening;
     int const age = ++updates_ - strong.from;
     if (strong_ && !holds_hessian() && age % strong.keep != 0) return;
-    operator_.set_ghosts({}, 1);  // unless a term has some
-    e.linearise(x, operator_, local_);
-    operator_.set_local(local_, e.fixed());
+    operator_.linearise(e, x, local_);
     if constexpr (!assembled) {
       strong_ =
           strong.from > 0 && age >= 0 && light_.build(operator_, strong.light, strong.most_light);

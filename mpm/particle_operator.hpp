@@ -40,6 +40,14 @@ public:
     fixed_ = fixed;
   }
 
+  /// Becomes the Hessian of a potential at x; `local` is room for the blocks of single nodes, which
+  /// it goes on reading.
+  template <class E, class Positions>
+  void linearise(E& e, Positions const& x, Blocks const& local) {
+    set_ghosts({}, 1);  // unless a term has some
+    e.linearise(x, *this, local);
+    set_local(local, e.fixed());
+  }
   /// Rows of a ghost penalty, times `scale`; those of before until they are told anew.
   void set_ghosts(GhostRows<S> const& rows, double scale) {
     ghosts_ = rows;

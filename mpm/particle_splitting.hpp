@@ -36,8 +36,7 @@ public:
     first_ = true;
     local_ = local_memory_.resize("split_local", e.size());
     // Blocks of what acts on nodes alone; the numbers are then replaced.
-    operator_.set_ghosts({}, 1);  // unless a term has some
-    e.linearise(x, operator_, local_);
+    operator_.linearise(e, x, local_);
     bool found = false;
     e.for_each_term([&](auto& term) {
       if constexpr (requires { term.start_split(x, 1.0, 1.0, state_, operator_); }) {
@@ -46,7 +45,6 @@ public:
       }
     });
     if (!found) throw Error("ADMM: no term of this potential has particles that it can split");
-    operator_.set_local(local_, e.fixed());
     fine_.resize(operator_.nodes(), operator_.fixed(), operator_);
     fine_.finish();
     cycle_.build(fine_);
