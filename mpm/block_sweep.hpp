@@ -67,7 +67,7 @@ struct BlockSweep {
   }
   /// Groups of `width` particles, padding included.
   KOKKOS_FORCEINLINE_FUNCTION int groups(int patch) const {
-    return (blocks.slot_begin(patch + 1) - blocks.slot_begin(patch)) / width;
+    return (blocks.slot_end(patch) - blocks.slot_begin(patch)) / width;
   }
   /// A local node of the patch that certainly is a node of the grid.
   KOKKOS_FORCEINLINE_FUNCTION int first_node(int patch) const {

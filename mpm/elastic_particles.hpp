@@ -2,6 +2,8 @@
 // places of the nodes of a grid: a swept term of the potential, for any material that tets take,
 // and for those whose points yield within a step by what they remember (particle_memory.hpp).
 //
+// A term knows some of the materials, those of one model; particles of others are another term's.
+//
 // The grid, and which particle sees which node, change from step to step: `update` before each.
 // Copies share nothing that changes within a step but what lags, so a Potential made after `update`
 // may hold one.
@@ -12,9 +14,12 @@
 #include <taut/core/potential/term.hpp>
 #include <taut/core/report/error.hpp>
 #include <taut/mpm/characteristic_force.hpp>
+#include <taut/mpm/own_patches.hpp>
 #include <taut/mpm/particle_assembly.hpp>
 #include <taut/mpm/particle_memory.hpp>
 #include <taut/mpm/particle_split.hpp>
+
+#include <algorithm>
 
 namespace taut {
 
@@ -93,11 +98,18 @@ public:
   /// What ParticleBlocks are to be padded to.
   static constexpr int lanes = kernels::BlockSweep<Space, Real, K, packed_>::lanes;
 
+  /// The materials are numbers `first_material`, that plus 1, and so on of the particles.
   /// `team_size`: threads per patch where not packed; 0: one on the host, 64 on a device. Throws
   /// Error if there is no material.
-  explicit ElasticParticles(std::vector<MaterialParameters> const& materials, int team_size = 0)
-      : materials_(to_space<Space>("materials", materials)), team_size_(packed_ ? 1 : team_size) {
+  explicit ElasticParticles(std::vector<MaterialParameters> const& materials,
+                            int first_material = 0, int team_size = 0)
+      : materials_(to_space<Space>("materials", materials)),
+        range_{first_material, first_material + static_cast<int>(materials.size())},
+        team_size_(packed_ ? 1 : team_size) {
     if (materials.empty()) throw Error("ElasticParticles: no materials; give one or more");
+    if (first_material < 0) {
+      throw Error("ElasticParticles: materials from number {} on; give 0 or more", first_material);
+    }
     if (team_size_ == 0) team_size_ = Space::on_host ? 1 : 64;
     List<double> const norms("material_norm", materials.size());
     auto const host = Kokkos::create_mirror_view(norms);
@@ -109,15 +121,17 @@ public:
     norms_ = norms;
   }
 
-  int material_count() const { return static_cast<int>(materials_.extent(0)); }
-  /// Those of the last update.
+  /// Of the particles, which are its own.
+  MaterialRange const& materials() const { return range_; }
+  /// Those of the last update, of other terms too.
   Particles<Precision, Space> const& particles() const { return particles_; }
 
   /// A new step begins: `blocks` are sorted by where `particles` are and bound to `grid`, whose
   /// nodes lie at `rest` (m).
   void update(Particles<Precision, Space> const& particles, ParticleBlocks<K, Space> const& blocks,
               GridNodes<Space> const& grid, Positions const& rest) {
-    blocks_ = blocks.views();
+    all_ = blocks.views();
+    blocks_ = own_.select(all_, range_, grid.count);
     grid_ = grid;
     cells_ = blocks.cells();
     cell_count_ = blocks.cell_count();
@@ -212,7 +226,7 @@ public:
   template <class Operator>
   void linearise(Positions const& x, double scale, Operator& to) const {
     static_assert(std::same_as<typename Operator::T, Real>);
-    to.resize(blocks_, grid_, team_size_);
+    to.resize(all_, grid_, team_size_);
     using Kernel_ = kernels::LineariseParticles<Space, Precision, Material, K, packed_>;
     run("particle_linearise", Kernel_{frame(x), static_cast<Real>(scale), to.numbers()});
   }
@@ -222,15 +236,15 @@ public:
   template <class Operator>
   void start_split(Positions const& x, double stiffness, double scale,
                    SplitParticleState<Real, Space>& state, Operator& to) const {
-    to.resize(blocks_, grid_, team_size_);
+    to.resize(all_, grid_, team_size_);
     grow(state.numbers, "split_numbers",
          data_.extent(0) / kernels::point_numbers * std::size_t(kernels::split_numbers));
-    grow(state.stiffness, "split_stiffness", norms_.extent(0));
+    grow(state.stiffness, "split_stiffness", std::max(all_.materials, range_.end));
     for_each<Space>("split_stiffness", static_cast<int>(norms_.extent(0)),
-                    kernels::ScaleNorms<Space>{norms_, state.stiffness, stiffness / 3});
+                    kernels::ScaleNorms<Space>{norms_, own_of(state), stiffness / 3});
     using Kernel_ = kernels::LineariseSplit<Space, Precision, Material, K, packed_>;
     run("split_linearise",
-        Kernel_{frame(x), state.stiffness, static_cast<Real>(scale), to.numbers()});
+        Kernel_{frame(x), own_of(state), static_cast<Real>(scale), to.numbers()});
   }
   /// Brings `state` up to x, and takes the gradient g of the potential to that of the split
   /// function.
@@ -239,7 +253,7 @@ public:
              Vectors const& g) const {
     provide_partial(fixed, 3);
     using Kernel_ = kernels::SplitParticles<Space, Precision, Material, K, packed_>;
-    run("particle_split", Kernel_{frame(x), state.stiffness, static_cast<Real>(scale),
+    run("particle_split", Kernel_{frame(x), own_of(state), static_cast<Real>(scale),
                                   static_cast<Real>(relaxation), first, state.numbers, partial_});
     gather<3>({{}, fixed, g, {}, {}});
   }
@@ -248,16 +262,17 @@ public:
               FixedMask<Space> const& fixed) const;
 
   /// See characteristic_force.hpp.
-  void add_characteristic_force(Array<double, Space> const& force) const {
+  void add_characteristic_force(Array<Real, Space> const& mass,
+                                Array<double, Space> const& force) const {
     List<double> const partial("characteristic_sums",
-                               std::size_t(2) * BlockViews<K, Space>::nodes * blocks_.patches);
+                               std::size_t(BlockViews<K, Space>::nodes) * blocks_.patches);
     using Sums_ = kernels::CharacteristicSums<Space, Precision, K>;
     for_each<Space>("characteristic_sums", blocks_.patches,
                     Sums_{{blocks_, data_}, particles_, norms_, partial});
-    using Add = kernels::AddCharacteristicForce<Space>;
-    for_each<Space>(
-        "characteristic_force", grid_.count,
-        kernels::GatherRows<Space, double, K, 2, Add>{blocks_, partial, {force, 24 * dx_ * dx_}});
+    using Add = kernels::AddCharacteristicForce<Space, Real>;
+    for_each<Space>("characteristic_force", grid_.count,
+                    kernels::GatherRows<Space, double, K, 1, Add>{
+                        blocks_, partial, {mass, force, 24 * dx_ * dx_}});
   }
 
   static constexpr double margin = kernels::inversion_margin;
@@ -328,11 +343,18 @@ private:
                     kernels::GatherRows<Space, Real, K, numbers, Add>{blocks_, partial_, {to}});
   }
 
+  /// Of the materials, those of this term.
+  List<double> own_of(SplitParticleState<Real, Space> const& state) const {
+    return Kokkos::subview(state.stiffness, Kokkos::make_pair(range_.first, range_.end));
+  }
+
   List<MaterialParameters const> materials_;
   List<double const> norms_;  ///< per material
+  MaterialRange range_;
   int team_size_;
   Particles<Precision, Space> particles_;
-  BlockViews<K, Space> blocks_;
+  BlockViews<K, Space> all_, blocks_;  ///< of all particles, and its own
+  OwnPatches<K, Space> own_;
   GridNodes<Space> grid_;
   typename ParticleBlocks<K, Space>::Cells cells_;
   int cell_count_ = 0, reducible_ = 0;

@@ -16,6 +16,7 @@
 // (slip) is handed down, weight by weight.
 #pragma once
 
+#include <taut/mpm/material_range.hpp>
 #include <taut/mpm/multigrid.hpp>
 #include <taut/mpm/particle_operator.hpp>
 #include <taut/mpm/sparse_grid.hpp>
@@ -26,11 +27,6 @@
 namespace taut {
 
 namespace kernels {
-
-struct VisitNothing {
-  template <class Term>
-  void operator()(Term&) const {}
-};
 
 /// Where the particles are among the slots of the fine level.
 template <Spline K, class S>
@@ -130,12 +126,6 @@ struct CoarseNode {
 };
 
 }  // namespace kernels
-
-/// `E` is a potential that shows its terms, of which one has particles perhaps.
-template <class E>
-concept ShowsTerms = requires(E& e) {
-  e.for_each_term(kernels::VisitNothing());
-};
 
 /// Over the particles of P with kernel K. `T` is Precision::real.
 template <Spline K, class P, class S>

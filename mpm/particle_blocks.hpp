@@ -39,11 +39,12 @@ struct BlockViews {
     return (i * side + j) * side + k;
   }
 
-  int patches = 0, blocks = 0;
+  int patches = 0, blocks = 0, materials = 0;
   int slots = 0;               ///< places for particles, padding included
   List<int> particle;          ///< per slot; -1: padding
   List<std::uint16_t> corner;  ///< per slot: 4 x the lowest local node that it sees
-  List<int> slot_begin;        ///< per patch, +1; a multiple of `lanes`
+  List<int> slot_begin;        ///< per patch; a multiple of `lanes`
+  List<int> slot_end;          ///< per patch: where its padding ends
   List<int> count;             ///< per patch: slots that hold particles, the first ones
   List<int> round_end;         ///< at slot_begin(patch) + r: where round r ends in the patch
   List<int> material;          ///< per patch
@@ -364,6 +365,7 @@ void ParticleBlocks<K, S>::sort(Positions const& x, List<int const> const& mater
   cell_count_ = exclusive_scan<S, int>("cells_before", count, cell_changes, cells_before_);
   views_.patches = patches;
   views_.blocks = blocks;
+  views_.materials = materials;
   grow(base_, "cells", cell_count_);
   grow(first_, "patch_first", patches);
   grow(views_.material, "patch_material", patches);
@@ -378,9 +380,10 @@ void ParticleBlocks<K, S>::sort(Positions const& x, List<int const> const& mater
                                   blocks_before_, cells_before_, first_, views_, base_});
   kernels::PaddedCount<S> const counts{first_, patches, count, lanes_};
   views_.slots = exclusive_scan<S, int>("slot_begin", patches, counts, views_.slot_begin);
-  using Last = Kokkos::pair<int, int>;
-  assign_on<S>(Kokkos::subview(views_.slot_begin, Last(patches, patches + 1)), views_.slots);
-  assign_on<S>(Kokkos::subview(views_.patch_begin, Last(blocks, blocks + 1)), patches);
+  using Part = Kokkos::pair<int, int>;
+  assign_on<S>(Kokkos::subview(views_.slot_begin, Part(patches, patches + 1)), views_.slots);
+  assign_on<S>(Kokkos::subview(views_.patch_begin, Part(blocks, blocks + 1)), patches);
+  views_.slot_end = Kokkos::subview(views_.slot_begin, Part(1, patches + 1));
   grow(views_.particle, "slot_particle", views_.slots);
   grow(views_.corner, "slot_corner", views_.slots);
   grow(views_.round_end, "round_end", views_.slots);

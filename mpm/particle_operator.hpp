@@ -3,10 +3,12 @@
 // ActionLevel takes as the fine level of a hierarchy: products, diagonal blocks, and the matrix of
 // the next coarser level from the particles at once. The fine matrix, too, where it is wanted.
 //
-// Who the particles are of is not known here: terms write the numbers (linearise).
+// Who the particles are of is not known here: terms write the numbers (linearise), each those of
+// its materials.
 #pragma once
 
 #include <taut/mpm/ghost_kernels.hpp>
+#include <taut/mpm/material_range.hpp>
 #include <taut/mpm/particle_assembly.hpp>
 
 namespace taut {
@@ -21,8 +23,8 @@ public:
   template <class N>
   using List = Kokkos::View<N*, typename S::memory>;
 
-  /// A term takes it on: its particles are in `blocks`, which are bound to `nodes`; `team_size` is
-  /// how many threads do a patch. The numbers are then to be written.
+  /// For the particles in `blocks`, which are bound to `nodes`; `team_size` is how many threads do
+  /// a patch. The numbers are then to be written.
   void resize(BlockViews<K, S> const& blocks, GridNodes<S> const& nodes, int team_size) {
     blocks_ = blocks;
     nodes_ = nodes;
@@ -44,6 +46,15 @@ public:
   /// it goes on reading.
   template <class E, class Positions>
   void linearise(E& e, Positions const& x, Blocks const& local) {
+    if constexpr (ShowsTerms<E>) {
+      for (int const terms : terms_of_materials(e)) {
+        if (terms == 1) continue;
+        throw Error(
+            "{} terms over the particles hold one material, and share no operator: take a "
+            "preconditioner that needs none (block Jacobi)",
+            terms);
+      }
+    }
     set_ghosts({}, 1);  // unless a term has some
     e.linearise(x, *this, local);
     set_local(local, e.fixed());

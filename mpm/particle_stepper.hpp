@@ -11,6 +11,7 @@
 #pragma once
 
 #include <taut/core/exec/copy.hpp>
+#include <taut/mpm/material_range.hpp>
 #include <taut/mpm/particle_grid.hpp>
 
 #include <algorithm>
@@ -75,14 +76,7 @@ public:
   auto step(Potential& scene, Grid& grid, Particles<Precision, Space> const& particles, double h,
             BoundaryList<Space>& boundaries, double time = 0, Observer const&... observer) {
     if (!(h > 0) || !std::isfinite(h)) throw Error("a step of {} s; give one above 0", h);
-    int materials = std::numeric_limits<int>::max();
-    scene.for_each_term([&](auto const& term) {
-      if constexpr (requires { term.material_count(); }) {
-        materials = std::min(materials, term.material_count());
-      }
-    });
-    if (materials == std::numeric_limits<int>::max()) materials = 1;
-    grid.rebuild(particles, materials);
+    grid.rebuild(particles, std::max(1, static_cast<int>(terms_of_materials(scene).size())));
     scene.resize(grid.unknowns());
     scene.for_each_term([&](auto& term) {
       if constexpr (requires {

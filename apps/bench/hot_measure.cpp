@@ -66,7 +66,8 @@ public:
 private:
   ParticlePotential make_potential() {
     grid_.rebuild(particles_, 1);
-    add_particle_term(terms_, "fixed_corotated", {lame_parameters(1e5, 0.3)});
+    add_particle_term(terms_, "fixed_corotated", std::array{lame_parameters(1e5, 0.3)},
+                      std::array{MaterialFlow()});
     terms_.update(particles_, grid_.blocks(), grid_.nodes(), grid_.rest());
     return ParticlePotential(grid_.unknowns(), Inertia<P>(grid_.unknowns()),
                              BodyForce<P>(grid_.unknowns(), {0, 0, 0}), terms_,

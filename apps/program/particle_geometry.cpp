@@ -68,24 +68,36 @@ MaterialFlow flow_of(MaterialParameters const& material, Plasticity const& p) {
   return flow;
 }
 
-/// Numbers the materials of bodies, then of sources; those that are alike have one number.
+/// Numbers the materials of bodies, then of sources; those that are alike have one number, and
+/// those of one model follow each other.
 std::vector<int> number_materials(ParticleScene const& scene, SceneParticles& to) {
-  std::vector<int> number;
-  std::vector<Plasticity> flows;
-  auto const add = [&](MaterialParameters const& material, Plasticity const& plasticity) {
-    std::size_t known = 0;
-    while (known < flows.size() &&
-           !(same(to.materials[known], material) && same(flows[known], plasticity))) {
-      ++known;
+  struct Kind {
+    MaterialParameters const* material;
+    Plasticity const* plasticity;
+    bool operator==(Kind const& other) const {
+      return same(*material, *other.material) && same(*plasticity, *other.plasticity);
     }
-    number.push_back(static_cast<int>(known));
-    if (known < flows.size()) return;
-    flows.push_back(plasticity);
-    to.materials.push_back(material);
-    to.flows.push_back(flow_of(material, plasticity));
   };
-  for (SceneBody const& body : scene.bodies) add(body.material, body.plasticity);
-  for (SceneSource const& source : scene.sources) add(source.material, source.plasticity);
+  std::vector<Kind> all;
+  for (SceneBody const& body : scene.bodies) all.push_back({&body.material, &body.plasticity});
+  for (SceneSource const& source : scene.sources) {
+    all.push_back({&source.material, &source.plasticity});
+  }
+  std::vector<Kind> kinds;
+  for (Kind const& one : all) {
+    if (std::find(kinds.begin(), kinds.end(), one) != kinds.end()) continue;
+    auto const alike = [&](Kind const& k) { return k.material->model == one.material->model; };
+    auto const last = std::find_if(kinds.rbegin(), kinds.rend(), alike);
+    kinds.insert(last == kinds.rend() ? kinds.end() : last.base(), one);
+  }
+  for (Kind const& one : kinds) {
+    to.materials.push_back(*one.material);
+    to.flows.push_back(flow_of(*one.material, *one.plasticity));
+  }
+  std::vector<int> number;
+  for (Kind const& one : all) {
+    number.push_back(static_cast<int>(std::find(kinds.begin(), kinds.end(), one) - kinds.begin()));
+  }
   return number;
 }
 

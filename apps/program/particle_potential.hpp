@@ -35,10 +35,16 @@ public:
   using GridBlocks = ProgramGrid::Blocks;
   using Operator = ParticleOperator<ParticleKernel, ParticlePrecision::real, DefaultSpace>;
   using Split = SplitParticleState<ParticlePrecision::real, DefaultSpace>;
+  using Mass = Array<ParticlePrecision::real, DefaultSpace>;
 
+  /// The next materials are those of `term`.
   template <class Term>
   void add(Term term) {
-    materials_ = std::min(materials_, term.material_count());
+    if (term.materials().first != materials_.end) {
+      throw Error("a term over the materials from {} on, where {} is next", term.materials().first,
+                  materials_.end);
+    }
+    materials_.end = term.materials().end;
     auto const held = Base::add(std::move(term));
     told_.push_back([held](Points const& particles, GridBlocks const& blocks,
                            GridNodes<DefaultSpace> const& grid,
@@ -52,11 +58,11 @@ public:
          [held](Positions const& x, double scale, double relaxation, bool first,
                 FixedMask<DefaultSpace> const& fixed, Split const& state,
                 Vectors const& g) { held->split(x, scale, relaxation, first, fixed, state, g); }});
-    measured_.push_back([held](Array<double, DefaultSpace> const& force) {
-      held->add_characteristic_force(force);
+    measured_.push_back([held](Mass const& mass, Array<double, DefaultSpace> const& force) {
+      held->add_characteristic_force(mass, force);
     });
   }
-  int material_count() const { return materials_; }
+  MaterialRange const& materials() const { return materials_; }
   Points const& particles() const { return particles_; }
   void update(Points const& particles, GridBlocks const& blocks,
               GridNodes<DefaultSpace> const& grid, Positions const& rest) {
@@ -64,35 +70,25 @@ public:
     for (auto const& tell : told_) tell(particles, blocks, grid, rest);
   }
 
-  /// For preconditioners that are made of particles. Throws Error unless one term holds all.
+  /// For preconditioners that are made of particles.
   void linearise(Positions const& x, double scale, Operator& to) const {
-    if (linearised_.size() != 1) {
-      throw Error(
-          "{} models over the particles have no operator in common: take solver.preconditioner = "
-          "\"block_jacobi\"",
-          linearised_.size());
-    }
-    linearised_.front()(x, scale, to);
+    for (auto const& write : linearised_) write(x, scale, to);
   }
-  /// For ADMM (mpm/particle_split.hpp). Throws Error unless one term holds all.
+  /// For ADMM (mpm/particle_split.hpp).
   void start_split(Positions const& x, double stiffness, double scale, Split& state,
                    Operator& to) const {
-    if (split_.size() != 1) {
-      throw Error("{} models over the particles cannot be split as one: choose another method",
-                  split_.size());
-    }
-    split_.front().start(x, stiffness, scale, state, to);
+    for (SplitTerm const& term : split_) term.start(x, stiffness, scale, state, to);
   }
   void split(Positions const& x, double scale, double relaxation, bool first,
              FixedMask<DefaultSpace> const& fixed, Split const& state, Vectors const& g) const {
-    split_.front().update(x, scale, relaxation, first, fixed, state, g);
+    for (SplitTerm const& term : split_) term.update(x, scale, relaxation, first, fixed, state, g);
   }
-  void add_characteristic_force(Array<double, DefaultSpace> const& force) const {
-    for (auto const& add : measured_) add(force);
+  void add_characteristic_force(Mass const& mass, Array<double, DefaultSpace> const& force) const {
+    for (auto const& add : measured_) add(mass, force);
   }
 
 private:
-  int materials_ = std::numeric_limits<int>::max();
+  MaterialRange materials_;
   Points particles_;
   std::vector<std::function<void(Points const&, GridBlocks const&, GridNodes<DefaultSpace> const&,
                                  Positions const&)>>
@@ -105,7 +101,7 @@ private:
         update;
   };
   std::vector<SplitTerm> split_;
-  std::vector<std::function<void(Array<double, DefaultSpace> const&)>> measured_;
+  std::vector<std::function<void(Mass const&, Array<double, DefaultSpace> const&)>> measured_;
 };
 
 using ParticlePotential =
@@ -114,14 +110,12 @@ using ParticlePotential =
 
 /// What ParticleBlocks are to be padded to for them.
 int particle_lanes();
-/// Adds the elastic term of a model (particle_models), the same whatever flows after a step.
-void add_particle_term(ParticleTerms& terms, std::string_view model,
-                       std::vector<Lame<double>> const& materials);
 /// Whether this model lets a material yield within the step that flows so after it.
 bool yields_in_step(std::string_view model, FlowKind kind);
-/// Adds the term of a model of which materials yield in the step as their flow does after it.
+/// Adds the elastic term of a model (particle_models) over the materials that come next, which may
+/// yield in the step as their flow does after it.
 void add_particle_term(ParticleTerms& terms, std::string_view model,
-                       std::vector<Lame<double>> const& materials,
-                       std::vector<MaterialFlow> const& flows);
+                       std::span<Lame<double> const> materials,
+                       std::span<MaterialFlow const> flows);
 
 }  // namespace taut

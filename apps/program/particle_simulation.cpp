@@ -130,7 +130,7 @@ public:
       throw Error("nothing has come out of a source when frame {} begins: compare a later one",
                   steps_ + 1);
     }
-    grid_.rebuild(particles_, potential_.template term<ParticleTerms>().material_count());
+    grid_.rebuild(particles_, potential_.template term<ParticleTerms>().materials().end);
     return nodes_at(grid_.rest());
   }
   std::vector<double> characteristic_residuals(std::vector<Point> const& x) const override {
@@ -260,14 +260,16 @@ private:
   ParticlePotential make_potential(SceneParticles const& start) {
     std::vector<Lame<double>> materials;
     for (MaterialParameters const& m : start.materials) {
-      if (m.model != start.materials.front().model) {
-        throw Error("{}: objects of {} and of {}: all material points of a scene have one model",
-                    scene_.file.string(), start.materials.front().model, m.model);
-      }
       materials.push_back(lame_parameters(m.young, m.poisson));
     }
+    // One term per model: its materials stand together.
     ParticleTerms terms;
-    add_particle_term(terms, start.materials.front().model, materials, start.flows);
+    for (std::size_t first = 0, end = 0; first < materials.size(); first = end) {
+      std::string const& model = start.materials[first].model;
+      while (end < materials.size() && start.materials[end].model == model) ++end;
+      add_particle_term(terms, model, std::span(materials).subspan(first, end - first),
+                        std::span(start.flows).subspan(first, end - first));
+    }
     GhostPenalty<ParticleKernel, P> const ghosts({.strength = points_.ghost_penalty});
     Point const& g = scene_.gravity;
     auto const& unknowns = grid_.unknowns();

@@ -11,19 +11,9 @@ namespace {
 
 constexpr std::string_view hencky_plastic = "hencky_plastic";
 
-}  // namespace
-
-std::span<std::string_view const> particle_models() {
-  static constexpr std::array<std::string_view, 7> models{
-      FixedCorotated::name, NeoHookean::name, StableNeoHookean::name, StableNeoHookean2018::name,
-      Arap::name,           Hencky::name,     hencky_plastic};
-  return models;
-}
-
-int particle_lanes() { return ProgramSolid<FixedCorotated>::lanes; }
-
-void add_particle_term(ParticleTerms& terms, std::string_view model,
-                       std::vector<Lame<double>> const& materials) {
+/// Of a model that is the same whatever flows after a step.
+void add_plain_term(ParticleTerms& terms, std::string_view model,
+                    std::vector<Lame<double>> const& materials) {
   ElasticModels::with(model, [&]<class Model>() {
     static_assert(ProgramSolid<Model>::lanes == ProgramSolid<FixedCorotated>::lanes);
     if constexpr (std::same_as<Model, FixedCorotated>) {
@@ -35,15 +25,26 @@ void add_particle_term(ParticleTerms& terms, std::string_view model,
   });
 }
 
+}  // namespace
+
+std::span<std::string_view const> particle_models() {
+  static constexpr std::array<std::string_view, 7> models{
+      FixedCorotated::name, NeoHookean::name, StableNeoHookean::name, StableNeoHookean2018::name,
+      Arap::name,           Hencky::name,     hencky_plastic};
+  return models;
+}
+
+int particle_lanes() { return ProgramSolid<FixedCorotated>::lanes; }
+
 bool yields_in_step(std::string_view model, FlowKind kind) {
   return model == hencky_plastic && (kind == FlowKind::von_mises || kind == FlowKind::sand);
 }
 
 void add_particle_term(ParticleTerms& terms, std::string_view model,
-                       std::vector<Lame<double>> const& materials,
-                       std::vector<MaterialFlow> const& flows) {
+                       std::span<Lame<double> const> materials,
+                       std::span<MaterialFlow const> flows) {
   if (model != Hencky::name && model != hencky_plastic) {
-    add_particle_term(terms, model, materials);
+    add_plain_term(terms, model, {materials.begin(), materials.end()});
     return;
   }
   std::vector<HenckyParameters<double>> all;

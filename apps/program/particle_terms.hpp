@@ -14,10 +14,10 @@ template <class Model>
 using ProgramSolid = ElasticParticles<Elastic<Model, FullProjection>, ParticleKernel,
                                       ParticlePrecision, DefaultSpace>;
 
-/// Adds the elastic term of `Model`.
+/// Adds the elastic term of `Model` over the materials that come next.
 template <class Model>
 void add_solid(ParticleTerms& terms, std::vector<Lame<double>> const& materials) {
-  terms.add(ProgramSolid<Model>(materials));
+  terms.add(ProgramSolid<Model>(materials, terms.materials().end));
 }
 
 /// The same for a model other than the default.

@@ -6,7 +6,7 @@ namespace {
 void add_hencky(ParticleTerms& terms, std::vector<HenckyParameters<double>> const& materials) {
   using Solid = ElasticParticles<Hencky, ParticleKernel, ParticlePrecision, DefaultSpace>;
   static_assert(Solid::lanes == ProgramSolid<FixedCorotated>::lanes);
-  terms.add(Solid(materials));
+  terms.add(Solid(materials, terms.materials().end));
 }
 
 bool const filled = add_hencky_late.fill(add_hencky);

@@ -498,7 +498,8 @@ public:
   void characteristic_force(Array<double, Space> const& force) const
       requires(CharacteristicTerm<Terms> || ...) {
     assign_on<Space>(force, 0.0);
-    for_each_of<is_characteristic>([&](auto const& term) { term.add_characteristic_force(force); });
+    for_each_of<is_characteristic>(
+        [&](auto const& term) { term.add_characteristic_force(unknowns_.mass, force); });
   }
 
   // For minimisers that go by bodies and islands (DivisibleObjective).

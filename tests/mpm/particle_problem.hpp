@@ -92,7 +92,7 @@ struct Problem {
   explicit Problem(int team_size = 0, int cells = 4, int per_axis = 2)
       : list(jittered_block(cells, per_axis, dx, {-3.3, 5.2, 6.6}, 2)),
         scene(list, dx, Term::lanes, 2),
-        term(materials, team_size),
+        term(materials, 0, team_size),
         oracle{C::Kernel::width, dx, list, materials, scene.places(), {}},
         fixed("fixed", scene.nodes()) {
     term.update(scene.particles, scene.blocks, scene.grid.nodes(), scene.rest);

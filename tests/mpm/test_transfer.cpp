@@ -212,7 +212,7 @@ TEST_CASE("many particles in one cell, of many materials, are all counted", "[mp
   std::vector<int> seen(1000, 0);
   for (int patch = 0; patch < views.patches; ++patch) {
     CHECK(views.slot_begin(patch) % 8 == 0);
-    for (int k = views.slot_begin(patch); k < views.slot_begin(patch + 1); ++k) {
+    for (int k = views.slot_begin(patch); k < views.slot_end(patch); ++k) {
       int const p = views.particle(k);
       CHECK((p >= 0) == (k < views.slot_begin(patch) + views.count(patch)));
       if (p < 0) continue;

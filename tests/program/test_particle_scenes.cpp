@@ -105,6 +105,7 @@ TEST_CASE("small scenes of material points run clean", "[particles][scenes]") {
                                    {"sand_wall", 2, 1600 * 0.1 * 0.1 * 0.04, 0.002},
                                    {"taylor_bar", 1, 8930 * pi * 0.0032 * 0.0032 * 0.0324, 1e-6},
                                    {"snowball", 3, 400 * 4 * pi * 1e-3 / 3, 0},
+                                   {"balls_on_sand", 2, -1, 0},
                                    {"donut", 1, -1, 0.004}}));
   CAPTURE(trial.scene);
   BuiltIn run(trial.scene, {fmt::format("time.frames={}", trial.frames)});
@@ -367,6 +368,68 @@ TEST_CASE("every model takes the steps of a cube that is spun out of shape", "[p
     CHECK(apart > 1e-6);
     CHECK(apart < 0.02);
   }
+}
+
+TEST_CASE("bodies of different models move as each does among its own kind", "[particles]") {
+  auto const after = [](char const* first, char const* second) {
+    auto const spun = [](char const* model) {
+      return replaced(
+          replaced(plain, "material = {",
+                   "velocity = { axis = [0, 1, 0], angular_velocity = 900 }\nmaterial = {"),
+          "young = 1e5", fmt::format("model = \"{}\", young = 1e5", model));
+    };
+    std::string const one = spun(first), other = spun(second);
+    std::string const body = other.substr(other.find("[[object]]"),
+                                          other.find("[[boundary]]") - other.find("[[object]]"));
+    SceneRun const run("cubes.toml",
+                       one + replaced(replaced(body, "\"cube\"", "\"other\""),
+                                      "translate = [0, 0.2, 0]", "translate = [3, 0.2, 0]"),
+                       {"solver.tolerance=1e-8", "time.step=0.004"});
+    Scene const scene = run.scene();
+    auto const simulation = ParticleSimulation::create(scene, build_particles(scene));
+    for (int n = 0; n < 3; ++n) CHECK(simulation->step().converged());
+    return simulation->particles();
+  };
+  auto const soft = after("fixed_corotated", "fixed_corotated"),
+             firm = after("neo_hookean", "neo_hookean"),
+             both = after("fixed_corotated", "neo_hookean");
+  double apart = 0, different = 0;
+  for (std::size_t p = 0; p < both.size(); ++p) {
+    Particle const& alike = both[p].object == 0 ? soft[p] : firm[p];
+    apart = std::max(apart, norm(both[p].x - alike.x));
+    different = std::max(different, norm(soft[p].x - firm[p].x));
+  }
+  CHECK(apart < 1e-9);
+  CHECK(different > 1e-6);
+}
+
+TEST_CASE("all kinds of methods find the same step of bodies of three models", "[particles]") {
+  auto const step = [&](std::vector<std::string> overrides) {
+    overrides.push_back("solver.tolerance=1e-6");
+    std::string const body = R"(
+[[object]]
+name = "{}"
+shape = {{ kind = "box", size = [0.4, 0.3, 0.4] }}
+translate = [0, {}, 0]
+material = {{ model = "{}", young = {}, poisson = 0.3, density = 2000 }}
+)";
+    SceneRun const run("cubes.toml",
+                       plain + fmt::format(fmt::runtime(body), "heavy", 0.55, "neo_hookean", 3e6) +
+                           fmt::format(fmt::runtime(body), "lid", 0.85, "arap", 1e5),
+                       std::move(overrides));
+    Scene const scene = run.scene();
+    auto const simulation = ParticleSimulation::create(scene, build_particles(scene));
+    CHECK(simulation->step().converged());
+    return simulation->positions();
+  };
+  auto const exact = step({"solver.method=newton", "solver.tolerance=1e-9"});
+  std::string const method = GENERATE(values<std::string>(
+      {"lbfgs", "dk", "hot", "lbfgs_gmg", "lbfgs_h", "pn_pcg", "pn_pcg_mf", "gast15", "admm"}));
+  CAPTURE(method);
+  auto const x = step({"solver.method=" + method});
+  double worst = 0;
+  for (std::size_t p = 0; p < x.size(); ++p) worst = std::max(worst, norm(x[p] - exact[p]));
+  CHECK(worst < 1e-5 * 0.1);
 }
 
 TEST_CASE("mistakes in a scene of material points are answered by a sentence", "[particles]") {
