@@ -3,9 +3,12 @@
 #include <taut/core/io/hash.hpp>
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
 #include <algorithm>
 #include <span>
+#include <string_view>
+#include <utility>
 
 namespace taut {
 namespace {
@@ -19,18 +22,17 @@ struct Write {
   void operator()(std::string const& word) const { text += fmt::format("\"{}\"", word); }
   void operator()(SceneValue::List const& list) const {
     text += '[';
-    for (SceneValue const& entry : list) {
-      std::visit(*this, entry.value);
-      text += ", ";
+    for (std::size_t k = 0; k < list.size(); ++k) {
+      if (k > 0) text += ", ";
+      std::visit(*this, list[k].value);
     }
     text += ']';
   }
   /// By name: the order of keys means nothing.
   void operator()(SceneValue::Table const& table) const {
-    std::vector<std::pair<std::string, SceneValue const*>> members;
-    for (auto const& [key, member] : table) members.emplace_back(key, &member);
-    std::sort(members.begin(), members.end());
-    text += '{';
+    std::map<std::string, SceneValue const*> members;
+    for (auto const& [key, member] : table) members.emplace(key, &member);
+    text += "{ ";
     for (auto const& [key, member] : members) {
       text += key + " = ";
       std::visit(*this, member->value);
@@ -39,6 +41,36 @@ struct Write {
     text += '}';
   }
 };
+
+std::string text_of(SceneValue const& value) {
+  std::string text;
+  std::visit(Write{text}, value.value);
+  return text;
+}
+
+/// Takes tables apart, and lists of them, by their names or places.
+void add_entries(SceneValue const& value, std::string const& path, RunIdentity& to) {
+  auto const* table = std::get_if<SceneValue::Table>(&value.value);
+  auto const* list = std::get_if<SceneValue::List>(&value.value);
+  bool const tables =
+      list && !list->empty() && std::holds_alternative<SceneValue::Table>(list->front().value);
+  if (table && !table->empty()) {
+    for (auto const& [key, member] : *table) {
+      add_entries(member, path.empty() ? key : path + '.' + key, to);
+    }
+  } else if (tables) {
+    std::string& order = to[path];
+    for (std::size_t k = 0; k < list->size(); ++k) {
+      SceneValue const* const name = (*list)[k].find("name");
+      auto const* const word = name ? std::get_if<std::string>(&name->value) : nullptr;
+      std::string const own = word ? *word : fmt::format("{}", k);
+      order += (k > 0 ? ", " : "") + own;
+      add_entries((*list)[k], path + '.' + own, to);
+    }
+  } else {
+    to[path] = text_of(value);
+  }
+}
 
 void erase(SceneValue& table, std::string_view key) {
   if (auto* members = std::get_if<SceneValue::Table>(&table.value))
@@ -50,25 +82,30 @@ void add(Hash& hash, std::vector<T> const& values) {
   hash.add(std::span<T const>(values));
 }
 
-}  // namespace
-
-namespace {
-
 /// The keys that a result depends on.
-std::string text_of(SceneChanges const& changes, Scene const& scene) {
+RunIdentity identity_of(SceneChanges const& changes, Scene const& scene) {
   SceneValue document = read_document(scene.file);
   if (changes.small) apply_small(document);
   for (std::string const& assignment : changes.overrides) apply_override(document, assignment);
   for (char const* key : {"description", "small", "sweep", "output"}) erase(document, key);
   if (SceneValue* time = document.find("time")) erase(*time, "frames");
-  std::string text;
-  std::visit(Write{text}, document.value);
-  return text;
+  RunIdentity identity;
+  add_entries(document, "", identity);
+  identity["output.every"] = fmt::format("{}", scene.output.every);
+  return identity;
 }
+
+/// Whether a run may go on with another value: not where a checkpoint holds what depends on it.
+bool is_of_solver(std::string_view key) {
+  return key.starts_with("solver.") && key != "solver.precision" &&
+         !key.starts_with("solver.sleep");
+}
+
+constexpr std::string_view prefix = "identity ";
 
 }  // namespace
 
-std::string run_identity(SceneChanges const& changes, Scene const& scene,
+RunIdentity run_identity(SceneChanges const& changes, Scene const& scene,
                          SceneGeometry const& geometry) {
   Hash hash;
   add(hash, geometry.mesh.points);
@@ -86,11 +123,12 @@ std::string run_identity(SceneChanges const& changes, Scene const& scene,
     add(hash, surface.mesh.points);
     add(hash, surface.mesh.triangles);
   }
-  return text_of(changes, scene) +
-         fmt::format("\nevery = {}\nmeshes {:016x}\n", scene.output.every, hash.value());
+  RunIdentity identity = identity_of(changes, scene);
+  identity["meshes and masks"] = fmt::format("{:016x}", hash.value());
+  return identity;
 }
 
-std::string run_identity(SceneChanges const& changes, Scene const& scene,
+RunIdentity run_identity(SceneChanges const& changes, Scene const& scene,
                          SceneParticles const& particles) {
   std::vector<double> numbers;
   // What comes out of sources follows from the text, and from how long the run is.
@@ -100,8 +138,42 @@ std::string run_identity(SceneChanges const& changes, Scene const& scene,
   }
   Hash hash;
   add(hash, numbers);
-  return text_of(changes, scene) +
-         fmt::format("\nevery = {}\nparticles {:016x}\n", scene.output.every, hash.value());
+  RunIdentity identity = identity_of(changes, scene);
+  identity["particles"] = fmt::format("{:016x}", hash.value());
+  return identity;
+}
+
+void save(RunIdentity const& identity, Checkpoint& checkpoint) {
+  for (auto const& [key, value] : identity) checkpoint.texts[std::string(prefix) + key] = value;
+}
+
+std::vector<std::string> solver_changes(RunIdentity const& now, Checkpoint const& checkpoint,
+                                        std::filesystem::path const& path) {
+  RunIdentity then;
+  for (auto const& [name, value] : checkpoint.texts) {
+    if (name.starts_with(prefix)) then[name.substr(prefix.size())] = value;
+  }
+  std::map<std::string, std::pair<std::string, std::string>> both;
+  for (auto const& [key, value] : now) both[key].first = value;
+  for (auto const& [key, value] : then) both[key].second = value;
+  std::vector<std::string> of_solver, others;
+  for (auto const& [key, values] : both) {
+    auto const& [value, before] = values;
+    if (value == before) continue;
+    (is_of_solver(key) ? of_solver : others)
+        .push_back(fmt::format("{}{}, it was {}", key,
+                               value.empty() ? " is not set" : " = " + value,
+                               before.empty() ? "not set" : before));
+  }
+  if (others.empty()) return of_solver;
+  constexpr std::size_t shown = 3;
+  std::string const rest =
+      others.size() > shown ? fmt::format(", and {} more", others.size() - shown) : std::string();
+  others.resize(std::min(others.size(), shown));
+  throw Error(
+      "{}: this is not the run that was interrupted: {}{}; undo that, or start the run again. Of "
+      "solver all may change but precision and sleep_*",
+      path.string(), fmt::join(others, "; "), rest);
 }
 
 }  // namespace taut

@@ -3,19 +3,33 @@
 
 #include <taut/apps/program/particle_geometry.hpp>
 #include <taut/apps/program/scene_geometry.hpp>
+#include <taut/core/io/checkpoint.hpp>
 
+#include <filesystem>
+#include <map>
 #include <string>
+#include <vector>
 
 namespace taut {
 
-/// A text that differs if anything does that a step depends on: the keys of the scene over its
-/// bases, with [small] and overrides laid over them, and all that was read from meshes and masks.
-/// What only decides how long a run is and what is written besides its frames is left out.
-std::string run_identity(SceneChanges const& changes, Scene const& scene,
+/// What differs if anything does that a step depends on, by the names that `--set` has: the keys of
+/// the scene over its bases, with [small] and overrides laid over them, and all that was read from
+/// meshes and masks. What only decides how long a run is and what is written besides its frames is
+/// left out.
+using RunIdentity = std::map<std::string, std::string>;
+
+RunIdentity run_identity(SceneChanges const& changes, Scene const& scene,
                          SceneGeometry const& geometry);
 
 /// The same of a scene of material points.
-std::string run_identity(SceneChanges const& changes, Scene const& scene,
+RunIdentity run_identity(SceneChanges const& changes, Scene const& scene,
                          SceneParticles const& particles);
+
+void save(RunIdentity const& identity, Checkpoint& checkpoint);
+
+/// A run may go on from `checkpoint` (at `path`) with another solver: says what has changed of it,
+/// each as "solver.tolerance = 1e-4, it was 1e-3". Throws Error that names what else has changed.
+std::vector<std::string> solver_changes(RunIdentity const& now, Checkpoint const& checkpoint,
+                                        std::filesystem::path const& path);
 
 }  // namespace taut

@@ -57,6 +57,8 @@ void clear_folder(std::filesystem::path const& folder) {
 }
 
 /// On the way out of an error, which must not be hidden by another one.
+std::string change_name(std::size_t k) { return fmt::format("change {}", k); }
+
 template <class Action>
 void attempt(Action&& action) {
   try {
@@ -84,7 +86,7 @@ RunTotals RunTotals::from_numbers(std::vector<double> const& n) {
 }
 
 RunLoop::RunLoop(Scene const& scene, RunOptions const& options, ResultMesh start,
-                 std::string identity)
+                 RunIdentity identity)
     : scene_(scene),
       start_(std::move(start)),
       identity_(std::move(identity)),
@@ -147,7 +149,9 @@ void RunLoop::begin() {
 }
 
 void RunLoop::go_on() {
-  Checkpoint const checkpoint = read_checkpoint(folder_ / "checkpoint.h5", identity_);
+  std::filesystem::path const path = folder_ / "checkpoint.h5";
+  Checkpoint const checkpoint = read_checkpoint(path);
+  std::vector<std::string> const now = solver_changes(identity_, checkpoint, path);
   simulation().restore(checkpoint);
   recorded_ = simulation().steps();
   totals_ = RunTotals::from_numbers(checkpoint.get<double>("totals"));
@@ -157,6 +161,13 @@ void RunLoop::go_on() {
     written = std::min(written, std::int64_t{recorded_ / scene_.output.every + 1});
   }
   result_.emplace(ResultWriter::resume(result_path(), start_, written, capacity()));
+  for (std::size_t k = 0; checkpoint.texts.contains(change_name(k)); ++k) {
+    changes_.push_back(checkpoint.texts.at(change_name(k)));
+  }
+  for (std::string const& change : now) {
+    changes_.push_back(fmt::format("from step {} on {}", recorded_ + 1, change));
+    fmt::print("{}\n", changes_.back());
+  }
   // Line k of the report is step k, counted from 1.
   log_.emplace(folder_ / "report.jsonl", recorded_ + 1);
 }
@@ -225,7 +236,9 @@ void RunLoop::checkpoint() {
   checkpoint.set("frames_written",
                  std::vector<std::int32_t>{static_cast<std::int32_t>(result_->frames())});
   checkpoint.set("totals", totals_.to_numbers());
-  write_checkpoint(folder_ / "checkpoint.h5", checkpoint, identity_);
+  save(identity_, checkpoint);
+  for (std::size_t k = 0; k < changes_.size(); ++k) checkpoint.texts[change_name(k)] = changes_[k];
+  write_checkpoint(folder_ / "checkpoint.h5", checkpoint);
 }
 
 void RunLoop::summarise(std::string const& how) const {
@@ -245,6 +258,7 @@ void RunLoop::summarise(std::string const& how) const {
       .set("largest_error_estimate_m", totals_.worst_error)
       .set("seconds", totals_.seconds)
       .set("frames_per_second", totals_.per_second());
+  if (!changes_.empty()) summary.set("solver_changes", changes_);
   write_summary(folder_ / "summary.json", summary);
 }
 

@@ -3,6 +3,7 @@
 #pragma once
 
 #include <taut/apps/program/commands.hpp>
+#include <taut/apps/program/run_identity.hpp>
 #include <taut/apps/program/simulation.hpp>
 #include <taut/core/io/vtkhdf.hpp>
 #include <taut/core/report/report_log.hpp>
@@ -45,7 +46,7 @@ public:
   int run();
 
 protected:
-  RunLoop(Scene const& scene, RunOptions const& options, ResultMesh start, std::string identity);
+  RunLoop(Scene const& scene, RunOptions const& options, ResultMesh start, RunIdentity identity);
 
   virtual Simulation& simulation() = 0;
   Simulation const& simulation() const { return const_cast<RunLoop*>(this)->simulation(); }
@@ -79,7 +80,8 @@ private:
 
   Scene const& scene_;
   ResultMesh start_;
-  std::string identity_;
+  RunIdentity identity_;
+  std::vector<std::string> changes_;  ///< of the solver, by restarts
   std::filesystem::path folder_;
   bool force_, restart_;
   std::optional<ResultWriter> result_;

@@ -9,11 +9,7 @@ namespace {
 namespace fs = std::filesystem;
 using hdf5::Handle;
 
-constexpr std::int64_t format_version = 2;
-
-std::int64_t hash_of(std::string_view text) {
-  return static_cast<std::int64_t>(Hash().add(text).value());
-}
+constexpr std::int64_t format_version = 3;
 
 /// What follows the HDF5 image in the file: HDF5 itself trusts the sizes and addresses that it
 /// reads, and damage there ends in a crash.
@@ -34,14 +30,10 @@ std::string checked_image(std::string content) {
 
 /// The bytes of the checkpoint's file. It is composed in memory because a file that HDF5 writes
 /// itself cannot be closed once the disk is full.
-std::string compose(Checkpoint const& checkpoint, std::int64_t scene) {
+std::string compose(Checkpoint const& checkpoint) {
   const Handle file = hdf5::create_in_memory();
   const Handle root = hdf5::make_group(file, "taut");
-  const auto write_number = [&](std::string const& name, std::int64_t value) {
-    hdf5::write_attribute(root, name, H5T_NATIVE_INT64, {}, &value);
-  };
-  write_number("version", format_version);
-  write_number("scene", scene);
+  hdf5::write_attribute(root, "version", H5T_NATIVE_INT64, {}, &format_version);
   const Handle arrays = hdf5::make_group(root, "arrays");
   for (auto const& [name, array] : checkpoint.arrays) {
     std::visit(
@@ -95,27 +87,24 @@ Checkpoint read_all(hid_t root) {
 
 }  // namespace
 
-void write_checkpoint(fs::path const& path, Checkpoint const& checkpoint,
-                      std::string_view scene_text) {
+void write_checkpoint(fs::path const& path, Checkpoint const& checkpoint) {
   const hdf5::Quiet quiet;
-  write_file_atomically(path, compose(checkpoint, hash_of(scene_text)), Durability::machine);
+  write_file_atomically(path, compose(checkpoint), Durability::machine);
 }
 
-Checkpoint read_checkpoint(fs::path const& path, std::string_view scene_text) {
+Checkpoint read_checkpoint(fs::path const& path) {
   if (!fs::exists(path)) {
     throw Error("{}: there is no checkpoint to restart from (looked for {}); start the run again.",
                 path.string(), fs::absolute(path).string());
   }
   const hdf5::Quiet quiet;
   std::int64_t version = 0;
-  std::int64_t scene = 0;
   Checkpoint checkpoint;
   try {
     std::string image = checked_image(read_file(path));
     const Handle file = hdf5::open_image(image);
     const Handle root = hdf5::open_group(file, "taut");
     version = hdf5::read_attribute(root, "version");
-    scene = hdf5::read_attribute(root, "scene");
     if (version == format_version) checkpoint = read_all(root);
   } catch (Error const& error) {
     throw Error("{}: this is no checkpoint that can be read, because {}; start the run again.",
@@ -126,12 +115,6 @@ Checkpoint read_checkpoint(fs::path const& path, std::string_view scene_text) {
         "{}: this checkpoint has format version {}, {} is what can be read; start the run "
         "again or use the program that wrote it.",
         path.string(), version, format_version);
-  }
-  if (scene != hash_of(scene_text)) {
-    throw Error(
-        "{}: the scene or options have changed since this checkpoint was written; undo the change "
-        "or start the run again.",
-        path.string());
   }
   return checkpoint;
 }

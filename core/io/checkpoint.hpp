@@ -7,7 +7,6 @@
 #include <filesystem>
 #include <map>
 #include <string>
-#include <string_view>
 #include <taut/core/report/error.hpp>
 #include <variant>
 #include <vector>
@@ -48,13 +47,11 @@ public:
   std::map<std::string, std::string> texts;
 };
 
-/// Writes `checkpoint` for the run of the scene with this text. Throws Error if it cannot be
-/// written.
-void write_checkpoint(std::filesystem::path const& path, Checkpoint const& checkpoint,
-                      std::string_view scene_text);
+/// Throws Error if it cannot be written.
+void write_checkpoint(std::filesystem::path const& path, Checkpoint const& checkpoint);
 
-/// Reads a checkpoint back bitwise. Throws Error if there is none, if it is damaged, of another
-/// format version, or was written for another scene text.
-Checkpoint read_checkpoint(std::filesystem::path const& path, std::string_view scene_text);
+/// Reads a checkpoint back bitwise. Throws Error if there is none, if it is damaged or of another
+/// format version.
+Checkpoint read_checkpoint(std::filesystem::path const& path);
 
 }  // namespace taut

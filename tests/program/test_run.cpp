@@ -130,16 +130,37 @@ TEST_CASE("a restart is refused once anything that matters has changed", "[run]"
   runner.options.restart = true;
 
   runner.folder.write("base.toml", test::replaced(base, "young = 1e5", "young = 2e5"));
-  runner.refused("scene or options have changed");
+  runner.refused(
+      "this is not the run that was interrupted: object.cube.material.young = 200000, it was "
+      "100000; "
+      "undo that");
   runner.folder.write("base.toml", base);
   mask(1);
-  runner.refused("scene or options have changed");
+  runner.refused("meshes and masks");
   mask(0);
-  runner.options.scene.changes.overrides = {"solver.tolerance=1e-4"};
-  runner.refused("scene or options have changed");
+  runner.options.scene.changes.overrides = {"solver.precision=fp32"};
+  runner.refused("solver.precision = \"fp32\", it was not set");
+  runner.options.scene.changes.overrides = {};
+  runner.folder.write("base.toml", base + "\n[contact]\n");
+  runner.refused("contact = { }, it was not set");
   // More steps, another description and other pictures are the same run.
   runner.folder.write("base.toml", base + "\n[output]\nobj = true\n");
   runner.run({"time.frames=3"}, true);
+}
+
+TEST_CASE("a restart may take another solver, and says so", "[run]") {
+  Runner runner;
+  runner.run({"time.frames=1", "solver.max_iterations=1"});
+  CHECK(runner.summary().at("steps_converged") == 0);
+  CHECK_FALSE(runner.summary().contains("solver_changes"));
+  runner.run({"time.frames=2", "solver.method=newton"}, true);
+  runner.run({"time.frames=3", "solver.method=newton"}, true);
+  auto const summary = runner.summary();
+  CHECK(summary.at("frames") == 3);
+  CHECK(summary.at("steps_converged") == 2);
+  CHECK(summary.at("solver_changes") ==
+        std::vector<std::string>{"from step 2 on solver.max_iterations is not set, it was 1",
+                                 "from step 2 on solver.method = \"newton\", it was not set"});
 }
 
 TEST_CASE("a result that is replaced leaves nothing of the old one", "[run]") {

@@ -216,18 +216,18 @@ TEST_CASE("a checkpoint that does not fit leaves the previous one") {
   const auto path = folder / "checkpoint.h5";
   Checkpoint state;
   state.set("x", std::vector<double>(1000, 1.5));
-  write_checkpoint(path, state, "scene");
+  write_checkpoint(path, state);
   const Child run([&](int pipe) {
     limit_file_size(6000);
     state.set("x", std::vector<double>(1000, 2.5));
-    say(pipe, outcome([&] { write_checkpoint(path, state, "scene"); }));
+    say(pipe, outcome([&] { write_checkpoint(path, state); }));
     say(pipe, outcome([&] { write_file_atomically(folder / "text", std::string(9000, 'x')); }));
   });
   const std::string said = run.said();
   run.wait();
   check_says(said, {path.string(), "cannot be written", "File too large",
                     (folder / "text").string() + ": cannot be written"});
-  CHECK(read_checkpoint(path, "scene").get<double>("x") == std::vector<double>(1000, 1.5));
+  CHECK(read_checkpoint(path).get<double>("x") == std::vector<double>(1000, 1.5));
   const auto entries = std::filesystem::directory_iterator(folder.path());
   CHECK(std::distance(begin(entries), end(entries)) == 1);
 }

@@ -45,7 +45,7 @@ TEST_CASE("a damaged checkpoint is refused, whatever the damage") {
   state.set("x", std::vector<double>(30, 1.5));
   state.set("steps", std::vector<std::int32_t>{7});
   state.texts["note"] = "two words";
-  write_checkpoint(path, state, "scene");
+  write_checkpoint(path, state);
   const std::string good = read_file(path);
   std::mt19937_64 random(20240607);
   for (int i = 0; i < 3000; ++i) {
@@ -53,13 +53,13 @@ TEST_CASE("a damaged checkpoint is refused, whatever the damage") {
     if (bad == good) continue;
     write_file_atomically(path, bad);
     try {
-      read_checkpoint(path, "scene");
+      read_checkpoint(path);
       FAIL("mutation " << i << " was read");
     } catch (Error const&) {
     }
   }
   write_file_atomically(path, good);
-  CHECK(read_checkpoint(path, "scene").get<double>("x") == std::vector<double>(30, 1.5));
+  CHECK(read_checkpoint(path).get<double>("x") == std::vector<double>(30, 1.5));
 }
 
 TEST_CASE("sizes in a damaged result are bounded by the file") {
