@@ -148,9 +148,8 @@ std::string random_particles(unsigned seed) {
                                    "translate = [0, {0}, 0]\n",
                                    6 * size);
   std::array const models{"fixed_corotated", "neo_hookean", "hencky", "hencky_plastic"};
-  char const* const model = dice.one_of<char const*>(models);
   double const fastest = 2 * size / (4 * step);
-  int const bodies = 1 + dice.below(2);
+  int const bodies = 1 + dice.below(3);
   for (int b = 0; b < bodies; ++b) {
     int const kind = dice.below(3);
     std::string const shape =
@@ -159,6 +158,7 @@ std::string random_particles(unsigned seed) {
                     : fmt::format("{{ kind = \"torus\", radius = {}, tube_radius = {} }}",
                                   0.4 * size, 0.15 * size);
     std::array const velocity{fastest * dice.between(-0.2, 0.2), -fastest * dice.between(0.3, 1)};
+    char const* const model = dice.one_of<char const*>(models);
     double const angle = dice.between(0, 360), spin = dice.between(-100, 100);
     double const young = dice.decades(1e4, 1e8), poisson = dice.between(0.1, 0.45);
     double const density = dice.decades(100, 8000), height = size * (1 + 1.8 * b);
