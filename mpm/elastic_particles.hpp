@@ -262,17 +262,17 @@ public:
               FixedMask<Space> const& fixed) const;
 
   /// See characteristic_force.hpp.
-  void add_characteristic_force(Array<Real, Space> const& mass,
-                                Array<double, Space> const& force) const {
+  void add_characteristic_force(Array<double, Space> const& force,
+                                Array<double, Space> const& mass) const {
     List<double> const partial("characteristic_sums",
-                               std::size_t(BlockViews<K, Space>::nodes) * blocks_.patches);
+                               std::size_t(2) * BlockViews<K, Space>::nodes * blocks_.patches);
     using Sums_ = kernels::CharacteristicSums<Space, Precision, K>;
     for_each<Space>("characteristic_sums", blocks_.patches,
                     Sums_{{blocks_, data_}, particles_, norms_, partial});
-    using Add = kernels::AddCharacteristicForce<Space, Real>;
+    using Add = kernels::AddCharacteristicForce<Space>;
     for_each<Space>("characteristic_force", grid_.count,
-                    kernels::GatherRows<Space, double, K, 1, Add>{
-                        blocks_, partial, {mass, force, 24 * dx_ * dx_}});
+                    kernels::GatherRows<Space, double, K, 2, Add>{
+                        blocks_, partial, {force, mass, 24 * dx_ * dx_}});
   }
 
   static constexpr double margin = kernels::inversion_margin;

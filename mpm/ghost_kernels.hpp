@@ -2,6 +2,7 @@
 #pragma once
 
 #include <taut/core/exec/parallel.hpp>
+#include <taut/core/potential/term.hpp>
 #include <taut/mpm/block_sweep.hpp>
 #include <taut/mpm/embedding.hpp>
 #include <taut/mpm/grid_matrix.hpp>

@@ -3,6 +3,7 @@
 #pragma once
 
 #include <taut/core/math/cubic.hpp>
+#include <taut/core/potential/term.hpp>
 #include <taut/mpm/particle_kernels.hpp>
 
 namespace taut::kernels {

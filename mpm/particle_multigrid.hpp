@@ -4,7 +4,7 @@
 // above coarser levels in float that are assembled from the particles and smoothed by Gauss-Seidel.
 // `assembled`: with the fine matrix, as HOT has it (Wang et al. 2020).
 //
-// For potentials in which one term holds all particles, a ghost penalty may hold light nodes, and
+// For potentials in which each material is one term's, a ghost penalty may hold light nodes, and
 // others act on single nodes; where more is coupled GridMultigrid takes the Hessian that the
 // potential assembles.
 #pragma once

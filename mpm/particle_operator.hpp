@@ -11,6 +11,8 @@
 #include <taut/mpm/material_range.hpp>
 #include <taut/mpm/particle_assembly.hpp>
 
+#include <vector>
+
 namespace taut {
 
 template <Spline K, class T_, class S_ = DefaultSpace, bool packed = S_::on_host>
@@ -46,8 +48,10 @@ public:
   /// it goes on reading.
   template <class E, class Positions>
   void linearise(E& e, Positions const& x, Blocks const& local) {
+    std::vector<int> terms_of;
     if constexpr (ShowsTerms<E>) {
-      for (int const terms : terms_of_materials(e)) {
+      terms_of = terms_of_materials(e);
+      for (int const terms : terms_of) {
         if (terms == 1) continue;
         throw Error(
             "{} terms over the particles hold one material, and share no operator: take a "
@@ -57,6 +61,10 @@ public:
     }
     set_ghosts({}, 1);  // unless a term has some
     e.linearise(x, *this, local);
+    if (ShowsTerms<E> && int(terms_of.size()) != blocks_.materials) {
+      throw Error("the particles are sorted by {} materials, of which terms hold {}",
+                  blocks_.materials, terms_of.size());
+    }
     set_local(local, e.fixed());
   }
   /// Rows of a ghost penalty, times `scale`; those of before until they are told anew.

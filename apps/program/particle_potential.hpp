@@ -5,17 +5,17 @@
 #include <taut/core/fem/element_material.hpp>
 #include <taut/core/potential/any_terms.hpp>
 #include <taut/core/potential/potential.hpp>
+#include <taut/core/report/error.hpp>
 #include <taut/materials/elastic.hpp>
 #include <taut/mpm/ghost_penalty.hpp>
+#include <taut/mpm/material_range.hpp>
 #include <taut/mpm/particle_grid.hpp>
 #include <taut/mpm/particle_operator.hpp>
 #include <taut/mpm/particle_split.hpp>
 #include <taut/mpm/plastic_flow.hpp>
 #include <taut/mpm/slip.hpp>
 
-#include <algorithm>
 #include <functional>
-#include <limits>
 #include <span>
 #include <string_view>
 
@@ -35,7 +35,7 @@ public:
   using GridBlocks = ProgramGrid::Blocks;
   using Operator = ParticleOperator<ParticleKernel, ParticlePrecision::real, DefaultSpace>;
   using Split = SplitParticleState<ParticlePrecision::real, DefaultSpace>;
-  using Mass = Array<ParticlePrecision::real, DefaultSpace>;
+  using Numbers = Array<double, DefaultSpace>;
 
   /// The next materials are those of `term`.
   template <class Term>
@@ -58,8 +58,8 @@ public:
          [held](Positions const& x, double scale, double relaxation, bool first,
                 FixedMask<DefaultSpace> const& fixed, Split const& state,
                 Vectors const& g) { held->split(x, scale, relaxation, first, fixed, state, g); }});
-    measured_.push_back([held](Mass const& mass, Array<double, DefaultSpace> const& force) {
-      held->add_characteristic_force(mass, force);
+    measured_.push_back([held](Numbers const& force, Numbers const& mass) {
+      held->add_characteristic_force(force, mass);
     });
   }
   MaterialRange const& materials() const { return materials_; }
@@ -83,8 +83,8 @@ public:
              FixedMask<DefaultSpace> const& fixed, Split const& state, Vectors const& g) const {
     for (SplitTerm const& term : split_) term.update(x, scale, relaxation, first, fixed, state, g);
   }
-  void add_characteristic_force(Mass const& mass, Array<double, DefaultSpace> const& force) const {
-    for (auto const& add : measured_) add(mass, force);
+  void add_characteristic_force(Numbers const& force, Numbers const& mass) const {
+    for (auto const& add : measured_) add(force, mass);
   }
 
 private:
@@ -101,7 +101,7 @@ private:
         update;
   };
   std::vector<SplitTerm> split_;
-  std::vector<std::function<void(Mass const&, Array<double, DefaultSpace> const&)>> measured_;
+  std::vector<std::function<void(Numbers const&, Numbers const&)>> measured_;
 };
 
 using ParticlePotential =

@@ -82,6 +82,9 @@ void add(Hash& hash, std::vector<T> const& values) {
   hash.add(std::span<T const>(values));
 }
 
+/// Of a checkpoint's numbers some depend on these.
+constexpr std::string_view fixed_of_solver[] = {"precision", "sleep_speed", "sleep_steps"};
+
 /// The keys that a result depends on.
 RunIdentity identity_of(SceneChanges const& changes, Scene const& scene) {
   SceneValue document = read_document(scene.file);
@@ -89,18 +92,32 @@ RunIdentity identity_of(SceneChanges const& changes, Scene const& scene) {
   for (std::string const& assignment : changes.overrides) apply_override(document, assignment);
   for (char const* key : {"description", "small", "sweep", "output"}) erase(document, key);
   if (SceneValue* time = document.find("time")) erase(*time, "frames");
+  // What of the solver must stay is said in full below, so that a default may be written out.
+  if (SceneValue* solver = document.find("solver")) {
+    for (std::string_view key : fixed_of_solver) erase(*solver, key);
+    auto const* left = std::get_if<SceneValue::Table>(&solver->value);
+    if (left && left->empty()) erase(document, "solver");
+  }
   RunIdentity identity;
   add_entries(document, "", identity);
   identity["output.every"] = fmt::format("{}", scene.output.every);
+  identity["solver.precision"] = scene.solver.text("precision");
+  if (double const speed = scene.solver.number("sleep_speed"); speed > 0) {
+    identity["solver.sleep_speed"] = fmt::format("{}", speed);
+    identity["solver.sleep_steps"] = fmt::format("{}", scene.solver.integer("sleep_steps"));
+  }
   return identity;
 }
 
-/// Whether a run may go on with another value: not where a checkpoint holds what depends on it.
+/// Whether a run may go on with another value.
 bool is_of_solver(std::string_view key) {
-  return key.starts_with("solver.") && key != "solver.precision" &&
-         !key.starts_with("solver.sleep");
+  constexpr std::string_view table = "solver.";
+  if (!key.starts_with(table)) return false;
+  auto const end = std::end(fixed_of_solver);
+  return std::find(std::begin(fixed_of_solver), end, key.substr(table.size())) == end;
 }
 
+constexpr std::string_view of_meshes = "meshes and masks", of_particles = "particles and walls";
 constexpr std::string_view prefix = "identity ";
 
 }  // namespace
@@ -124,7 +141,7 @@ RunIdentity run_identity(SceneChanges const& changes, Scene const& scene,
     add(hash, surface.mesh.triangles);
   }
   RunIdentity identity = identity_of(changes, scene);
-  identity["meshes and masks"] = fmt::format("{:016x}", hash.value());
+  identity[std::string(of_meshes)] = fmt::format("{:016x}", hash.value());
   return identity;
 }
 
@@ -138,8 +155,16 @@ RunIdentity run_identity(SceneChanges const& changes, Scene const& scene,
   }
   Hash hash;
   add(hash, numbers);
+  for (std::size_t k = 0; k < scene.particles->boundaries.size(); ++k) {
+    // Other shapes are in the keys, and half spaces are drawn as large as the scene.
+    if (!std::holds_alternative<std::filesystem::path>(scene.particles->boundaries[k].shape)) {
+      continue;
+    }
+    add(hash, particles.drawings[k].points);
+    add(hash, particles.drawings[k].triangles);
+  }
   RunIdentity identity = identity_of(changes, scene);
-  identity["particles"] = fmt::format("{:016x}", hash.value());
+  identity[std::string(of_particles)] = fmt::format("{:016x}", hash.value());
   return identity;
 }
 
@@ -157,15 +182,23 @@ std::vector<std::string> solver_changes(RunIdentity const& now, Checkpoint const
   for (auto const& [key, value] : now) both[key].first = value;
   for (auto const& [key, value] : then) both[key].second = value;
   std::vector<std::string> of_solver, others;
+  std::string files;
   for (auto const& [key, values] : both) {
     auto const& [value, before] = values;
     if (value == before) continue;
+    if (key == of_meshes || key == of_particles) {
+      files = key;  // of itself, or because of the others
+      continue;
+    }
     (is_of_solver(key) ? of_solver : others)
         .push_back(fmt::format("{}{}, it was {}", key,
                                value.empty() ? " is not set" : " = " + value,
                                before.empty() ? "not set" : before));
   }
-  if (others.empty()) return of_solver;
+  if (others.empty() && files.empty()) return of_solver;
+  if (others.empty()) {
+    others.push_back(fmt::format("what the {} of the scene hold has changed", files));
+  }
   constexpr std::size_t shown = 3;
   std::string const rest =
       others.size() > shown ? fmt::format(", and {} more", others.size() - shown) : std::string();

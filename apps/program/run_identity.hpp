@@ -12,10 +12,10 @@
 
 namespace taut {
 
-/// What differs if anything does that a step depends on, by the names that `--set` has: the keys of
-/// the scene over its bases, with [small] and overrides laid over them, and all that was read from
-/// meshes and masks. What only decides how long a run is and what is written besides its frames is
-/// left out.
+/// What differs if anything does that a step depends on: the keys of the scene over its bases, by
+/// the names that `--set` has, with [small] and overrides laid over them, the order of what has
+/// names, and a hash of all that was read from meshes and masks. What only decides how long a run
+/// is and what is written besides its frames is left out.
 using RunIdentity = std::map<std::string, std::string>;
 
 RunIdentity run_identity(SceneChanges const& changes, Scene const& scene,

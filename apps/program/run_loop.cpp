@@ -56,9 +56,10 @@ void clear_folder(std::filesystem::path const& folder) {
   }
 }
 
-/// On the way out of an error, which must not be hidden by another one.
+/// In a checkpoint, of the changes of the solver.
 std::string change_name(std::size_t k) { return fmt::format("change {}", k); }
 
+/// On the way out of an error, which must not be hidden by another one.
 template <class Action>
 void attempt(Action&& action) {
   try {
@@ -165,7 +166,7 @@ void RunLoop::go_on() {
     changes_.push_back(checkpoint.texts.at(change_name(k)));
   }
   for (std::string const& change : now) {
-    changes_.push_back(fmt::format("from step {} on {}", recorded_ + 1, change));
+    changes_.push_back(fmt::format("from step {} on: {}", recorded_ + 1, change));
     fmt::print("{}\n", changes_.back());
   }
   // Line k of the report is step k, counted from 1.

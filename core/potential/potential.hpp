@@ -257,6 +257,14 @@ struct FreeMass {
   }
 };
 
+template <class S>
+struct DivideByMass {
+  Array<double, S> force, mass;
+  KOKKOS_FUNCTION void operator()(int i) const {
+    if (mass(i) > 0) force(i) /= mass(i);
+  }
+};
+
 }  // namespace kernels
 
 template <class... Terms>
@@ -494,12 +502,14 @@ public:
     });
   }
 
-  /// What residuals of unknowns are measured by, N: the sum over the terms that can tell.
+  /// What residuals of unknowns are measured by, N: the mean over the terms that can tell.
   void characteristic_force(Array<double, Space> const& force) const
       requires(CharacteristicTerm<Terms> || ...) {
+    Array<double, Space> const mass("characteristic_mass", size());
     assign_on<Space>(force, 0.0);
     for_each_of<is_characteristic>(
-        [&](auto const& term) { term.add_characteristic_force(unknowns_.mass, force); });
+        [&](auto const& term) { term.add_characteristic_force(force, mass); });
+    for_each<Space>("characteristic_force", size(), kernels::DivideByMass<Space>{force, mass});
   }
 
   // For minimisers that go by bodies and islands (DivisibleObjective).

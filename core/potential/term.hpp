@@ -159,14 +159,13 @@ concept CertifyingTerm = SweptTerm<Term> &&
 };
 
 /// A term that can say what force, N, a deformation of the size of an element meets at each
-/// unknown: what residuals are measured by (Zhu et al. 2018; Wang et al. 2020, section 6). Adds its
-/// part, of unknowns of these masses (kg).
+/// unknown: what residuals are measured by (Zhu et al. 2018; Wang et al. 2020, section 6). A mean
+/// over mass: adds force times mass, N kg, and the mass, kg.
 template <class Term>
 concept CharacteristicTerm = SweptTerm<Term> &&
-    requires(Term const& term,
-             Array<typename Term::Precision::real, typename Term::Space> const& mass,
-             Array<double, typename Term::Space> const& force) {
-  {term.add_characteristic_force(mass, force)};
+    requires(Term const& term, Array<double, typename Term::Space> const& force,
+             Array<double, typename Term::Space> const& mass) {
+  {term.add_characteristic_force(force, mass)};
 };
 
 /// A swept term that does not couple unknowns either: its Hessian is what `add_gradient` adds to

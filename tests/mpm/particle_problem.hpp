@@ -62,6 +62,24 @@ inline double difference(Field const& a, Field const& b) {
   return most;
 }
 
+/// Where nodes may have gone, and a step that they may take.
+struct JitteredNodes {
+  Field x, p;
+  JitteredNodes(std::vector<std::array<int, 3>> const& at, double dx) {
+    std::mt19937 random(3);
+    auto const jitter = [&] { return double(random()) / 4294967296.0 - 0.5; };
+    for (auto const& ijk : at) {
+      Vec3<double> place, step;
+      for (int c = 0; c < 3; ++c) {
+        place[c] = dx * (ijk[c] + 0.15 * jitter());
+        step[c] = 0.02 * dx * jitter();
+      }
+      x.push_back(place);
+      p.push_back(step);
+    }
+  }
+};
+
 /// Two materials for a problem.
 template <class Material>
 std::vector<typename Material::template Parameters<double>> two_materials() {
@@ -96,20 +114,9 @@ struct Problem {
         oracle{C::Kernel::width, dx, list, materials, scene.places(), {}},
         fixed("fixed", scene.nodes()) {
     term.update(scene.particles, scene.blocks, scene.grid.nodes(), scene.rest);
-    std::mt19937 random(3);
-    auto const jitter = [&] { return double(random()) / 4294967296.0 - 0.5; };
-    auto const at = scene.places();
-    for (auto const& ijk : at) {
-      Vec3<double> place, step;
-      for (int c = 0; c < 3; ++c) {
-        place[c] = dx * (ijk[c] + 0.15 * jitter());
-        step[c] = 0.02 * dx * jitter();
-      }
-      x_host.push_back(place);
-      p_host.push_back(step);
-    }
-    x = field_of<Positions>(x_host);
-    p = field_of<Vectors>(p_host);
+    JitteredNodes const nodes(scene.places(), dx);
+    x = field_of<Positions>(nodes.x);
+    p = field_of<Vectors>(nodes.p);
     x_host = read(x);
     p_host = read(p);
   }

@@ -3,7 +3,6 @@
 #include <taut/core/potential/potential.hpp>
 #include <taut/core/sparse/operations.hpp>
 #include <taut/integrators/admm.hpp>
-#include <taut/integrators/lbfgs.hpp>
 #include <taut/integrators/time_stepper.hpp>
 #include <taut/materials/models.hpp>
 #include <taut/mpm/ghost_penalty.hpp>
@@ -14,6 +13,7 @@
 #include <catch2/matchers/catch_matchers_exception.hpp>
 #include <catch2/matchers/catch_matchers_string.hpp>
 
+#include "cycle_on_kernel.hpp"
 #include "particle_problem.hpp"
 
 namespace taut {
@@ -370,15 +370,6 @@ TEST_CASE("what holds light nodes is part of the operator and of all its matrice
   check_coarse(LinearEmbedding(), GridMatrix<S, double, 2>());
 }
 
-template <Spline K>
-struct OnKernel {
-  template <class Precision, class Space>
-  using Cycle = ParticleMultigrid<
-      Precision, Space,
-      ParticleCyclePolicies<false, Chebyshev, ForwardBackward, LinearEmbedding, float, K>>;
-  using Minimiser = Lbfgs<Cycle, SufficientDecrease, DecrementWindow, Fp64>;
-};
-
 /// Iterations of three steps of a ball of this stiffness that falls onto the ground, and how far
 /// its particles are then.
 struct Fall {
@@ -444,7 +435,7 @@ Fall fall(double young, double strength, typename Minimiser::Params const& param
 }
 template <Spline K = QuadraticSpline>
 Fall fall(double young, double strength, double spin = 0) {
-  return fall<K, typename OnKernel<K>::Minimiser>(
+  return fall<K, typename test::CycleOnKernel<K>::Minimiser>(
       young, strength, {.lbfgs = {.newton_step = false}, .stop = {.tolerance = 1e-5}}, spin);
 }
 

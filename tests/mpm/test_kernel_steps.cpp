@@ -1,18 +1,17 @@
 // Whole steps with every kernel: the default minimiser with its cycle, whose stencils are as wide
 // as the kernel asks for, against another minimiser.
 #include <taut/core/potential/potential.hpp>
-#include <taut/integrators/lbfgs.hpp>
 #include <taut/integrators/ncg.hpp>
 #include <taut/integrators/time_stepper.hpp>
 #include <taut/materials/models.hpp>
 #include <taut/mpm/elastic_particles.hpp>
-#include <taut/mpm/particle_multigrid.hpp>
 #include <taut/mpm/particle_stepper.hpp>
 
 #include <catch2/catch_template_test_macros.hpp>
 
 #include <algorithm>
 
+#include "cycle_on_kernel.hpp"
 #include "particle_scenes.hpp"
 
 namespace taut {
@@ -21,15 +20,7 @@ namespace {
 using S = DefaultSpace;
 using P = Fp64;
 
-template <Spline K>
-struct Kernel {
-  template <class Precision, class Space>
-  using Cycle = ParticleMultigrid<
-      Precision, Space,
-      ParticleCyclePolicies<false, Chebyshev, ForwardBackward, LinearEmbedding, float, K>>;
-  using Multigrid = Lbfgs<Cycle, SufficientDecrease, DecrementWindow, P>;
-  using Plain = Ncg<DaiKou, BlockJacobi, SufficientDecrease, DecrementWindow, P>;
-};
+using Plain = Ncg<DaiKou, BlockJacobi, SufficientDecrease, DecrementWindow, P>;
 
 struct End {
   static constexpr double dx = 0.1;
@@ -68,10 +59,9 @@ End drop(typename Minimiser::Params const& params) {
 
 TEMPLATE_TEST_CASE("every kernel composes with the cycle, and minimisers agree on its steps",
                    "[mpm][stepper]", LinearSpline, QuadraticSpline, CubicSpline) {
-  using K = Kernel<TestType>;
-  End const cycle = drop<TestType, typename K::Multigrid>(
+  End const cycle = drop<TestType, typename test::CycleOnKernel<TestType>::Minimiser>(
       {.lbfgs = {.newton_step = false}, .stop = {.tolerance = 1e-6}});
-  End const plain = drop<TestType, typename K::Plain>({.stop = {.tolerance = 1e-6}});
+  End const plain = drop<TestType, Plain>({.stop = {.tolerance = 1e-6}});
   CAPTURE(cycle.iterations, plain.iterations);
   REQUIRE(cycle.particles.size() == plain.particles.size());
   double moved = 0, apart = 0, strained = 0;

@@ -3,6 +3,7 @@
 #include "scene_run.hpp"
 
 #include <taut/apps/program/particle_simulation.hpp>
+#include <taut/apps/program/run_identity.hpp>
 #include <taut/core/io/mesh_reader.hpp>
 #include <taut/core/report/error.hpp>
 
@@ -89,7 +90,10 @@ TEST_CASE("a run with a source goes on bitwise, and may be prolonged", "[particl
   std::string const text =
       replaced(replaced(jet, "end = 0.12", "end = 0.17"), "[time]",
                "gravity = [0, -10, 0]\n\n[[boundary]]\nname = \"wall\"\nshape = { kind = "
-               "\"half_space\", point = [0.4, 0, 0], normal = [-1, 0, 0] }\n\n[time]");
+               "\"half_space\", point = [0.4, 0, 0], normal = [-1, 0, 0] }\n\n[time]") +
+      // What is there from the start is of another model.
+      "[[object]]\nname = \"cube\"\nshape = { kind = \"box\", size = [0.3, 0.3, 0.3] }\n"
+      "material = { model = \"neo_hookean\", young = 1e5, poisson = 0.3, density = 1000 }\n";
   SceneRun whole("jet.toml", text), first("jet.toml", text, {"time.frames=2"});
   REQUIRE(run_command(whole.options) == 0);
   REQUIRE(run_command(first.options) == 0);
@@ -179,6 +183,19 @@ motion = [{ end = 1, velocity = [0, 0.4, 0], axis = [0, 1, 0], centre = [0, 0, 0
   for (std::size_t p = 0; p < x.size(); ++p)
     if (start.list[p].x[1] < 0) lifted = std::max(lifted, x[p][1] - start.list[p].x[1]);
   CHECK(lifted > 0.004);
+
+  // A run of another wall is another run.
+  RunIdentity const before = run_identity({}, scene, start);
+  auto const identity = [&] {
+    Scene const now = file.scene();
+    return run_identity({}, now, build_particles(now));
+  };
+  RunIdentity const of_file = identity();
+  CHECK(of_file == identity());
+  CHECK(of_file != before);
+  mesh.points[0][0] -= 1;
+  write_obj(folder / "table.obj", mesh);
+  CHECK(of_file != identity());
 
   mesh.triangles.pop_back();
   write_obj(folder / "table.obj", mesh);

@@ -136,10 +136,10 @@ TEST_CASE("a restart is refused once anything that matters has changed", "[run]"
       "undo that");
   runner.folder.write("base.toml", base);
   mask(1);
-  runner.refused("meshes and masks");
+  runner.refused("what the meshes and masks of the scene hold has changed");
   mask(0);
   runner.options.scene.changes.overrides = {"solver.precision=fp32"};
-  runner.refused("solver.precision = \"fp32\", it was not set");
+  runner.refused("solver.precision = fp32, it was fp64");
   runner.options.scene.changes.overrides = {};
   runner.folder.write("base.toml", base + "\n[contact]\n");
   runner.refused("contact = { }, it was not set");
@@ -149,6 +149,13 @@ TEST_CASE("a restart is refused once anything that matters has changed", "[run]"
 }
 
 TEST_CASE("a restart may take another solver, and says so", "[run]") {
+  Runner emptied(test::plain_scene + "\n[solver]\nmax_iterations = 1\n");
+  emptied.run({"time.frames=1"});
+  emptied.folder.write("scene.toml", test::plain_scene + "\n[solver]\n");
+  // What is the default is no change.
+  emptied.run({"time.frames=2", "solver.precision=fp64", "solver.sleep_speed=0"}, true);
+  CHECK(emptied.summary().at("solver_changes").size() == 1);
+
   Runner runner;
   runner.run({"time.frames=1", "solver.max_iterations=1"});
   CHECK(runner.summary().at("steps_converged") == 0);
@@ -159,8 +166,8 @@ TEST_CASE("a restart may take another solver, and says so", "[run]") {
   CHECK(summary.at("frames") == 3);
   CHECK(summary.at("steps_converged") == 2);
   CHECK(summary.at("solver_changes") ==
-        std::vector<std::string>{"from step 2 on solver.max_iterations is not set, it was 1",
-                                 "from step 2 on solver.method = \"newton\", it was not set"});
+        std::vector<std::string>{"from step 2 on: solver.max_iterations is not set, it was 1",
+                                 "from step 2 on: solver.method = \"newton\", it was not set"});
 }
 
 TEST_CASE("a result that is replaced leaves nothing of the old one", "[run]") {
