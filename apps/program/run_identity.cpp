@@ -28,18 +28,8 @@ struct Write {
     }
     text += ']';
   }
-  /// By name: the order of keys means nothing.
-  void operator()(SceneValue::Table const& table) const {
-    std::map<std::string, SceneValue const*> members;
-    for (auto const& [key, member] : table) members.emplace(key, &member);
-    text += "{ ";
-    for (auto const& [key, member] : members) {
-      text += key + " = ";
-      std::visit(*this, member->value);
-      text += ", ";
-    }
-    text += '}';
-  }
+  /// Without members: all others are taken apart.
+  void operator()(SceneValue::Table const&) const { text += "{ }"; }
 };
 
 std::string text_of(SceneValue const& value) {
