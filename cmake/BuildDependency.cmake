@@ -25,9 +25,15 @@ function(taut_has_sha256 file sha256 result)
 endfunction()
 
 # Configures, builds and installs the project in SOURCE into PREFIX with the given options, unless PREFIX holds the
-# outcome of just these options already. The log is kept beside PREFIX.
+# outcome of just these options, and of the files EDITED in SOURCE, already. The log is kept beside PREFIX.
 function(taut_build_once name source prefix)
-  set(key "${source};${ARGN};${CMAKE_CXX_COMPILER};${CMAKE_CXX_COMPILER_VERSION}")
+  cmake_parse_arguments(PARSE_ARGV 3 built "" "" EDITED)
+  set(options ${built_UNPARSED_ARGUMENTS})
+  set(key "${source};${options};${CMAKE_CXX_COMPILER};${CMAKE_CXX_COMPILER_VERSION}")
+  foreach(file IN LISTS built_EDITED)
+    file(SHA256 "${source}/${file}" sum)
+    list(APPEND key ${sum})
+  endforeach()
   string(SHA256 key "${key}")
   set(stamp "${prefix}/.taut-options")
   if(EXISTS "${stamp}")
@@ -45,7 +51,7 @@ function(taut_build_once name source prefix)
   cmake_host_system_information(RESULT cores QUERY NUMBER_OF_LOGICAL_CORES)
   set(configure "${CMAKE_COMMAND}" -S "${source}" -B "${build}" -G "${CMAKE_GENERATOR}" -DCMAKE_BUILD_TYPE=Release
       "-DCMAKE_INSTALL_PREFIX=${prefix}" -DCMAKE_INSTALL_LIBDIR=lib "-DCMAKE_CXX_COMPILER=${CMAKE_CXX_COMPILER}"
-      ${ARGN})
+      ${options})
   set(install "${CMAKE_COMMAND}" --build "${build}" --parallel ${cores} --target install)
   foreach(step configure install)
     execute_process(COMMAND ${${step}} OUTPUT_VARIABLE output ERROR_VARIABLE output RESULT_VARIABLE status)

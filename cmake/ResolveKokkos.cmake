@@ -76,6 +76,35 @@ function(taut_adapt_kokkos_to_cuda_13 source)
   file(WRITE "${header}" "${text}")
 endfunction()
 
+# Releases up to 5.0 compare packs of doubles for AVX-512 the wrong way round by > and >= (Kokkos pull request 8797).
+set(kokkos_wrong_way "static_cast<__m512d>\\(rhs\\),([ \n]*)static_cast<__m512d>\\(lhs\\),([ \n]*)_CMP_G")
+
+# Turns them in SOURCE.
+function(taut_mend_kokkos_avx512 source)
+  set(header "${source}/simd/src/Kokkos_SIMD_AVX512.hpp")
+  file(READ "${header}" text)
+  string(REGEX REPLACE "${kokkos_wrong_way}"
+         "static_cast<__m512d>(lhs),\\1static_cast<__m512d>(rhs),\\2_CMP_G" text "${text}")
+  file(WRITE "${header}" "${text}")
+endfunction()
+
+# Refuses a Kokkos for AVX-512 that has them.
+function(taut_check_kokkos_avx512)
+  get_target_property(folders Kokkos::kokkoscore INTERFACE_INCLUDE_DIRECTORIES)
+  string(REGEX REPLACE "\\$<[A-Z_]+:([^>]*)>" "\\1" folders "${folders}")
+  foreach(folder IN LISTS folders)
+    if(EXISTS "${folder}/KokkosCore_config.h" AND EXISTS "${folder}/Kokkos_SIMD_AVX512.hpp")
+      file(STRINGS "${folder}/KokkosCore_config.h" avx512 REGEX "define KOKKOS_ARCH_AVX512XEON")
+      file(READ "${folder}/Kokkos_SIMD_AVX512.hpp" text)
+      if(avx512 AND text MATCHES "${kokkos_wrong_way}")
+        message(FATAL_ERROR "The Kokkos in ${Kokkos_DIR} compares packs of doubles for AVX-512 the wrong way round "
+                            "(Kokkos pull request 8797): apply that to it, or configure with "
+                            "-DCMAKE_DISABLE_FIND_PACKAGE_Kokkos=ON to let Taut build its own.")
+      endif()
+    endif()
+  endforeach()
+endfunction()
+
 if(TAUT_BACKEND STREQUAL "openmp")
   set(kokkos_wanted OPENMP SERIAL)
 elseif(TAUT_BACKEND STREQUAL "serial")
@@ -129,8 +158,11 @@ else()
       taut_adapt_kokkos_to_cuda_13("${kokkos_source}")
     endif()
   endif()
-  taut_build_once(Kokkos "${kokkos_source}" "${kokkos_prefix}" ${kokkos_options})
+  taut_mend_kokkos_avx512("${kokkos_source}")
+  taut_build_once(Kokkos "${kokkos_source}" "${kokkos_prefix}" ${kokkos_options}
+                  EDITED simd/src/Kokkos_SIMD_AVX512.hpp)
   set(CMAKE_DISABLE_FIND_PACKAGE_Kokkos FALSE)
   find_package(Kokkos REQUIRED QUIET PATHS "${kokkos_prefix}" NO_DEFAULT_PATH)
   message(STATUS "Kokkos: ${kokkos_origin}, built in ${kokkos_prefix}")
 endif()
+taut_check_kokkos_avx512()

@@ -82,7 +82,7 @@ struct QuadraticForms {
   Kokkos::View<Real*, Kokkos::HostSpace> sums;  ///< [task][lane]
 
   template <class T>
-  static T form(Lame<double> const& lame, Real const* from) {
+  KOKKOS_FORCEINLINE_FUNCTION static T form(Lame<double> const& lame, Real const* from) {
     Mat3<T> F, dF;
     for (int k = 0; k < 9; ++k) F.a[k] = load<T>(from + k * lanes);
     for (int k = 0; k < 9; ++k) dF.a[k] = load<T>(from + (9 + k) * lanes);

@@ -96,6 +96,7 @@ struct GradientSweep : PatchSweep<S, typename Precision::real> {
     auto const lame = Material::template cast<T>(materials(v.material(patch)));
     auto const elements = this->elements(patch);
     auto const body = [&](int g) __attribute__((always_inline)) {
+      elements.ask_ahead(g);
       Mat3<T> D, d;
       if (after_step) {
         elements.edges(g, local.data(), D, d);
@@ -161,6 +162,7 @@ struct ProductSweep : PatchSweep<S, typename Precision::real> {
     auto const lame = Material::template cast<T>(materials(v.material(patch)));
     auto const elements = this->elements(patch);
     auto const body = [&](int g) __attribute__((always_inline)) {
+      elements.ask_ahead(g);
       Mat3<T> const B = elements.inverse_rest(g);
       Mat3<T> D, d;
       elements.edges(g, local.data(), D, d);
@@ -228,6 +230,7 @@ struct MeasureSweep : PatchSweep<S, typename Precision::real> {
     [[maybe_unused]] InversionCertificate<T> const certificate(largest_x, largest_p);
     [[maybe_unused]] T square_length(Kokkos::Experimental::finite_max_v<Real>);
     auto const body = [&](int g) __attribute__((always_inline)) {
+      elements.ask_ahead(g);
       Mat3<T> const B = elements.inverse_rest(g);
       T density;
       if constexpr (measure == Measure::energy) {

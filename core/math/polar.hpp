@@ -156,7 +156,7 @@ KOKKOS_FORCEINLINE_FUNCTION Mat3<T> polar_rotation(Mat3<T> const& F) {
   // steps suffice where eta^3 < epsilon.
   T const enough((single ? 4.9e-3 : 6e-6) / 6);
   auto const hard = p.value(x) + margin >= enough * square(p.slope(x));
-  if (Kokkos::Experimental::any_of(hard)) {
+  if (any_lane(hard)) {
     kernels::Quaternion<T> const safe = kernels::dominant_eigenvector(K);
     for (int i = 0; i < 4; ++i) q.q[i] = select(hard, safe.q[i], q.q[i]);
   }
@@ -182,7 +182,7 @@ KOKKOS_FORCEINLINE_FUNCTION T stretch_sum(T const& I2, T const& J, T const& C2) 
   for (int i = 0; i < 16; ++i) {
     T const step = select(p.value(x) > noise, p.step(x), T(0));
     x = x + step;
-    if (!Kokkos::Experimental::any_of(step < -small)) break;
+    if (!any_lane(step < -small)) break;
   }
   return norm * x;
 }

@@ -31,7 +31,7 @@ KOKKOS_INLINE_FUNCTION SquareMatrix<T, N> project_psd(SquareMatrix<T, N> const& 
   T smallest = e.values[0];
   for (int k = 1; k < N; ++k) smallest = min(smallest, e.values[k]);
   auto const project = smallest < floor;
-  if (!Kokkos::Experimental::any_of(project)) return a;
+  if (!any_lane(project)) return a;
   SquareMatrix<T, N> r;
   for (int j = 0; j < N; ++j)
     for (int i = 0; i <= j; ++i) {

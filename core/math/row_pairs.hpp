@@ -1,5 +1,5 @@
 // Rows of eight numbers in memory that hold two 3-vectors of a vertex, in places 0 to 2 and 4 to 6:
-// one index finds both, and where a register holds eight numbers one load fetches them.
+// one index finds both, and where a register holds eight numbers or more one load fetches them.
 #pragma once
 
 #include <taut/core/math/rows.hpp>
@@ -15,20 +15,20 @@ KOKKOS_FORCEINLINE_FUNCTION void load_row_pairs(ValueType<T> const* from, Index 
     using Registers = kernels::QuadsOf<T>;
     using Vector = typename Registers::Vector;
     constexpr int lanes = ScalarTraits<T>::lanes;
-    if constexpr (lanes == 8) {
-      auto const row = [&](int lane) __attribute__((always_inline)) {
-        Vector v;
-        std::memcpy(&v, from + 2 * std::size_t(begin[lane]), sizeof v);
-        return v;
+    if constexpr (lanes >= 8) {
+      // The rows of every eighth lane in one register.
+      auto const rows = [&](int lane) __attribute__((always_inline)) {
+        return Registers::template load_octets<2>(from, begin + lane);
       };
-      Vector low[4] = {row(0), row(1), row(2), row(3)}, high[4] = {row(4), row(5), row(6), row(7)};
-      // Quad 0 of these is of the first vectors, quad 1 of the second ones.
+      Vector low[4] = {rows(0), rows(1), rows(2), rows(3)},
+             high[4] = {rows(4), rows(5), rows(6), rows(7)};
+      // Even quads of these are of the first vectors, odd ones of the second.
       Registers::transpose(low);
       Registers::transpose(high);
+      constexpr std::make_integer_sequence<int, lanes> numbers;
       for (int c = 0; c < 3; ++c) {
-        a[c] = std::bit_cast<T>(__builtin_shufflevector(low[c], high[c], 0, 1, 2, 3, 8, 9, 10, 11));
-        b[c] =
-            std::bit_cast<T>(__builtin_shufflevector(low[c], high[c], 4, 5, 6, 7, 12, 13, 14, 15));
+        a[c] = std::bit_cast<T>(Registers::template every_other<0>(low[c], high[c], numbers));
+        b[c] = std::bit_cast<T>(Registers::template every_other<1>(low[c], high[c], numbers));
       }
     } else {
       load_rows<2>(from, begin, a);

@@ -55,6 +55,25 @@ struct Quads {
                          std::make_integer_sequence<int, W>());
     }
   }
+  /// Octet j from from[scale begin[8 j]...].
+  template <int scale, class Index>
+  static Vector load_octets(Real const* from, Index const* begin) {
+    if constexpr (W == 8) {
+      Vector v;
+      std::memcpy(&v, from + scale * std::size_t(*begin), sizeof v);
+      return v;
+    } else {
+      using Half = Quads<Real, W / 2>;
+      return concatenate(Half::template load_octets<scale>(from, begin),
+                         Half::template load_octets<scale>(from, begin + W / 2),
+                         std::make_integer_sequence<int, W>());
+    }
+  }
+  /// Quads `which`, 2 + `which` and so on of two registers, by turns.
+  template <int which, int... k>
+  static Vector every_other(Vector a, Vector b, std::integer_sequence<int, k...>) {
+    return __builtin_shufflevector(a, b, (k / 8 * 8 + 4 * which + k % 4 + k % 8 / 4 * W)...);
+  }
   template <class Half, int... k>
   static Vector concatenate(Half a, Half b, std::integer_sequence<int, k...>) {
     return __builtin_shufflevector(a, b, k...);
@@ -150,27 +169,34 @@ KOKKOS_FORCEINLINE_FUNCTION void add_quads(T const* row, ValueType<T>* to, Index
 }
 
 #if defined(__GNUC__) && !defined(__CUDACC__)
-/// Adds rows of five to eight numbers of eight lanes, a whole register at a time: half the loads
-/// and stores of two quads.
+/// Adds rows of five to eight numbers, eight at a time: half the loads and stores of two quads.
 template <int numbers, int scale, class T, class Index>
 KOKKOS_FORCEINLINE_FUNCTION void add_octets(T const* row, ValueType<T>* to, Index const* begin) {
   using Registers = QuadsOf<T>;
   using Vector = typename Registers::Vector;
+  using Octet = typename Quads<ValueType<T>, 8>::Vector;
+  constexpr int lanes = ScalarTraits<T>::lanes;
   Vector a[4], b[4] = {};
   for (int c = 0; c < 4; ++c) a[c] = std::bit_cast<Vector>(row[c]);
   for (int c = 4; c < numbers; ++c) b[c - 4] = std::bit_cast<Vector>(row[c]);
   Registers::transpose(a);
   Registers::template transpose<(numbers <= 6)>(b);
-  for (int lane = 0; lane < 8; ++lane) {
-    int const j = lane % 4;
-    Vector const add = lane < 4 ? __builtin_shufflevector(a[j], b[j], 0, 1, 2, 3, 8, 9, 10, 11)
-                                : __builtin_shufflevector(a[j], b[j], 4, 5, 6, 7, 12, 13, 14, 15);
-    Vector sum;
-    ValueType<T>* const at = to + scale * std::size_t(begin[lane]);
-    std::memcpy(&sum, at, sizeof sum);
-    sum += add;
-    std::memcpy(at, &sum, sizeof sum);
+  auto const add = [&]<int quad>(std::integral_constant<int, quad>) __attribute__((always_inline)) {
+    for (int j = 0; j < 4; ++j) {
+      constexpr int q = 4 * quad, r = lanes + q;
+      Octet const more =
+          __builtin_shufflevector(a[j], b[j], q, q + 1, q + 2, q + 3, r, r + 1, r + 2, r + 3);
+      Octet sum;
+      ValueType<T>* const at = to + scale * std::size_t(begin[q + j]);
+      std::memcpy(&sum, at, sizeof sum);
+      sum += more;
+      std::memcpy(at, &sum, sizeof sum);
+    }
+  };
+  [&]<int... quad>(std::integer_sequence<int, quad...>) __attribute__((always_inline)) {
+    (add(std::integral_constant<int, quad>()), ...);
   }
+  (std::make_integer_sequence<int, lanes / 4>());
 }
 #endif
 
@@ -181,7 +207,7 @@ KOKKOS_FORCEINLINE_FUNCTION void add_octets(T const* row, ValueType<T>* to, Inde
 template <int numbers, int scale, class T, class Index>
 KOKKOS_FORCEINLINE_FUNCTION void add_rows(T const* row, ValueType<T>* to, Index const* begin) {
 #if defined(__GNUC__) && !defined(__CUDACC__)
-  if constexpr (numbers > 4 && kernels::has_quads<T> && ScalarTraits<T>::lanes == 8) {
+  if constexpr (numbers > 4 && kernels::has_quads<T> && ScalarTraits<T>::lanes >= 8) {
     kernels::add_octets<Kokkos::min(numbers, 8), scale>(row, to, begin);
     if constexpr (numbers > 8) add_rows<numbers - 8, scale>(row + 8, to + 8, begin);
     return;

@@ -167,8 +167,15 @@ KOKKOS_FORCEINLINE_FUNCTION double sum_lanes(T const& a) {
 template <class T, class Abi>
 KOKKOS_FORCEINLINE_FUNCTION bool any_lane(
     Kokkos::Experimental::basic_simd_mask<T, Abi> const& mask) {
-#if defined(__AVX2__) && !defined(__CUDACC__)
   // One instruction, where Kokkos asks lane after lane.
+#if defined(__AVX512F__) && !defined(__CUDACC__)
+  if constexpr (requires { static_cast<__mmask16>(mask); }) {
+    return static_cast<__mmask16>(mask) != 0;
+  } else if constexpr (requires { static_cast<__mmask8>(mask); }) {
+    return static_cast<__mmask8>(mask) != 0;
+  }
+#endif
+#if defined(__AVX2__) && !defined(__CUDACC__)
   if constexpr (requires { static_cast<__m256>(mask); }) {
     return _mm256_movemask_ps(static_cast<__m256>(mask)) != 0;
   } else if constexpr (requires { static_cast<__m256d>(mask); }) {
@@ -177,6 +184,7 @@ KOKKOS_FORCEINLINE_FUNCTION bool any_lane(
 #endif
   return Kokkos::Experimental::any_of(mask);
 }
+KOKKOS_FORCEINLINE_FUNCTION bool any_lane(bool mask) { return mask; }
 
 /// Largest lane.
 template <class T>

@@ -136,7 +136,7 @@ KOKKOS_INLINE_FUNCTION SquareEigen<T, N> symmetric_eigen(SquareMatrix<T, N> a) {
     T largest(0);
     for (int q = 1; q < N; ++q)
       for (int p = 0; p < q; ++p) largest = max(largest, abs(a(p, q)));
-    if (!Kokkos::Experimental::any_of(largest > negligible)) break;
+    if (!any_lane(largest > negligible)) break;
     kernels::jacobi_sweep(a, e.vectors, negligible);
   }
   for (int k = 0; k < N; ++k) e.values[k] = scale * a(k, k) + zero;
