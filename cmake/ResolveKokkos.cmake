@@ -68,13 +68,21 @@ endfunction()
 # CUDA 13 changed the signatures of two functions that this release of Kokkos calls; later releases have the same edits.
 function(taut_adapt_kokkos_to_cuda_13 source)
   set(header "${source}/core/src/Cuda/Kokkos_Cuda_Instance.hpp")
-  file(READ "${header}" text)
+  file(READ "${header}" original)
+  set(text "${original}")
   string(REPLACE "cudaGraphAddDependencies(graph, from, to, numDependencies)"
                  "cudaGraphAddDependencies(graph, from, to, nullptr, numDependencies)" text "${text}")
   string(REPLACE "cudaMemPrefetchAsync(devPtr, count, dstDevice, m_stream)"
                  "cudaMemPrefetchAsync(devPtr, count, {cudaMemLocationTypeDevice, dstDevice}, 0, m_stream)" text "${text}")
-  file(WRITE "${header}" "${text}")
+  taut_write_edited("${header}")
 endfunction()
+
+# Writes `text` to FILE if it is not `original`: presets share the source, and another one may be building from it.
+macro(taut_write_edited file)
+  if(NOT text STREQUAL original)
+    file(WRITE "${file}" "${text}")
+  endif()
+endmacro()
 
 # Releases up to 5.0 compare packs of doubles for AVX-512 the wrong way round by > and >= (Kokkos pull request 8797).
 set(kokkos_wrong_way "static_cast<__m512d>\\(rhs\\),([ \n]*)static_cast<__m512d>\\(lhs\\),([ \n]*)_CMP_G")
@@ -82,27 +90,37 @@ set(kokkos_wrong_way "static_cast<__m512d>\\(rhs\\),([ \n]*)static_cast<__m512d>
 # Turns them in SOURCE.
 function(taut_mend_kokkos_avx512 source)
   set(header "${source}/simd/src/Kokkos_SIMD_AVX512.hpp")
-  file(READ "${header}" text)
+  file(READ "${header}" original)
   string(REGEX REPLACE "${kokkos_wrong_way}"
-         "static_cast<__m512d>(lhs),\\1static_cast<__m512d>(rhs),\\2_CMP_G" text "${text}")
-  file(WRITE "${header}" "${text}")
+         "static_cast<__m512d>(lhs),\\1static_cast<__m512d>(rhs),\\2_CMP_G" text "${original}")
+  taut_write_edited("${header}")
 endfunction()
 
 # Refuses a Kokkos for AVX-512 that has them.
 function(taut_check_kokkos_avx512)
-  get_target_property(folders Kokkos::kokkoscore INTERFACE_INCLUDE_DIRECTORIES)
-  string(REGEX REPLACE "\\$<[A-Z_]+:([^>]*)>" "\\1" folders "${folders}")
-  foreach(folder IN LISTS folders)
-    if(EXISTS "${folder}/KokkosCore_config.h" AND EXISTS "${folder}/Kokkos_SIMD_AVX512.hpp")
-      file(STRINGS "${folder}/KokkosCore_config.h" avx512 REGEX "define KOKKOS_ARCH_AVX512XEON")
-      file(READ "${folder}/Kokkos_SIMD_AVX512.hpp" text)
-      if(avx512 AND text MATCHES "${kokkos_wrong_way}")
-        message(FATAL_ERROR "The Kokkos in ${Kokkos_DIR} compares packs of doubles for AVX-512 the wrong way round "
-                            "(Kokkos pull request 8797): apply that to it, or configure with "
-                            "-DCMAKE_DISABLE_FIND_PACKAGE_Kokkos=ON to let Taut build its own.")
-      endif()
+  set(folders "")
+  foreach(target IN ITEMS Kokkos::kokkoscore Kokkos::kokkossimd)
+    if(TARGET ${target})
+      get_target_property(of_target ${target} INTERFACE_INCLUDE_DIRECTORIES)
+      list(APPEND folders ${of_target})
     endif()
   endforeach()
+  string(REGEX REPLACE "\\$<[A-Z_]+:([^>]*)>" "\\1" folders "${folders}")
+  set(avx512 "")
+  set(text "")
+  foreach(folder IN LISTS folders)
+    if(EXISTS "${folder}/KokkosCore_config.h")
+      file(STRINGS "${folder}/KokkosCore_config.h" avx512 REGEX "define KOKKOS_ARCH_AVX512XEON")
+    endif()
+    if(EXISTS "${folder}/Kokkos_SIMD_AVX512.hpp")
+      file(READ "${folder}/Kokkos_SIMD_AVX512.hpp" text)
+    endif()
+  endforeach()
+  if(avx512 AND text MATCHES "${kokkos_wrong_way}")
+    message(FATAL_ERROR "The Kokkos in ${Kokkos_DIR} compares packs of doubles for AVX-512 the wrong way round "
+                        "(Kokkos pull request 8797): apply that to it, or configure with "
+                        "-DCMAKE_DISABLE_FIND_PACKAGE_Kokkos=ON to let Taut build its own.")
+  endif()
 endfunction()
 
 if(TAUT_BACKEND STREQUAL "openmp")
@@ -162,6 +180,7 @@ else()
   taut_build_once(Kokkos "${kokkos_source}" "${kokkos_prefix}" ${kokkos_options}
                   EDITED simd/src/Kokkos_SIMD_AVX512.hpp)
   set(CMAKE_DISABLE_FIND_PACKAGE_Kokkos FALSE)
+  unset(Kokkos_DIR CACHE)  # of one that was found earlier, and refused
   find_package(Kokkos REQUIRED QUIET PATHS "${kokkos_prefix}" NO_DEFAULT_PATH)
   message(STATUS "Kokkos: ${kokkos_origin}, built in ${kokkos_prefix}")
 endif()

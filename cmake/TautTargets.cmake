@@ -41,16 +41,18 @@ target_compile_definitions(taut_usage INTERFACE $<$<COMPILE_LANGUAGE:CUDA>:FMT_U
 set(taut_optimise_less "$<$<AND:$<COMPILE_LANGUAGE:CXX>,$<CONFIG:Release>>:-Og>")
 if(TAUT_CHECKED)
   set(sanitizers -fsanitize=address,undefined)
-  target_compile_options(taut_usage INTERFACE ${sanitizers} -fno-sanitize-recover=all -fno-omit-frame-pointer -O1)
+  # The sanitizers name lines; knowing of variables too would take the compiler twice as long.
+  target_compile_options(taut_usage INTERFACE ${sanitizers} -fno-sanitize-recover=all -fno-omit-frame-pointer -O1 -g1)
   target_link_options(taut_usage INTERFACE ${sanitizers})
 endif()
 
 # The headers of GCC 12.0 to 12.2 for AVX-512 hand undefined registers to instructions that do not read them, and the
 # compiler takes that for a mistake wherever it inlines them (GCC bug 105593).
 set(taut_false_alarms)
-if(CMAKE_CXX_COMPILER_ID STREQUAL "GNU" AND CMAKE_CXX_COMPILER_VERSION VERSION_LESS 12.3)
+if(CMAKE_CXX_COMPILER_ID STREQUAL "GNU" AND CMAKE_CXX_COMPILER_VERSION VERSION_GREATER_EQUAL 12
+   AND CMAKE_CXX_COMPILER_VERSION VERSION_LESS 12.3)
   include(CheckCXXSourceCompiles)
-  set(CMAKE_REQUIRED_FLAGS -march=native)  # as Kokkos compiles for
+  set(CMAKE_REQUIRED_FLAGS -march=native)  # what the Kokkos that is built here compiles for
   check_cxx_source_compiles("#ifndef __AVX512F__\n#error\n#endif\nint main() {}" TAUT_AVX512)
   unset(CMAKE_REQUIRED_FLAGS)
   if(TAUT_AVX512)
@@ -99,7 +101,7 @@ endfunction()
 function(taut_target target)
   target_link_libraries(${target} PUBLIC taut_usage)
   set_target_properties(${target} PROPERTIES CXX_EXTENSIONS OFF)
-  set(warnings -Wall -Wextra -Wshadow)
+  set(warnings -Wall -Wextra -Wshadow ${taut_false_alarms})
   if(TAUT_BACKEND STREQUAL "cuda")
     # What reaches Kokkos is nvcc's; the rest (toml++ is too much for nvcc) stays with the host's compiler.
     get_target_property(sources ${target} SOURCES)
@@ -115,7 +117,7 @@ function(taut_target target)
       $<$<COMPILE_LANGUAGE:CUDA>:-Xcompiler=${host_warnings} $<$<BOOL:${TAUT_WARNINGS_AS_ERRORS}>:-Werror=all-warnings>>
       $<$<COMPILE_LANGUAGE:CXX>:${warnings} $<$<BOOL:${TAUT_WARNINGS_AS_ERRORS}>:-Werror>>)
   else()
-    target_compile_options(${target} PRIVATE ${warnings} -Wpedantic ${taut_false_alarms} $<$<BOOL:${TAUT_WARNINGS_AS_ERRORS}>:-Werror>)
+    target_compile_options(${target} PRIVATE ${warnings} -Wpedantic $<$<BOOL:${TAUT_WARNINGS_AS_ERRORS}>:-Werror>)
     if(CMAKE_CXX_COMPILER_ID STREQUAL "GNU")
       target_compile_options(${target} PRIVATE -fpch-preprocess)  # for ccache
       # GCC collects its garbage when its heap has grown by so many kB: a tenth of the time, for a quarter more memory.

@@ -61,7 +61,8 @@ struct ParticleInversion : ParticleSweep<S, Precision, Material, K, packed> {
 
   std::size_t scratch_bytes() const { return 2 * Base::row_bytes(3); }
 
-  KOKKOS_FUNCTION double step_to_flat(int slot, int const* node) const {
+  /// What is beyond `shortest` may be answered by infinity.
+  KOKKOS_FUNCTION double step_to_flat(int slot, int const* node, double shortest) const {
     constexpr double infinity = Kokkos::Experimental::infinity_v<double>;
     PointReader<S, Real, K> const reader{this->blocks, this->data};
     double const per_dx = 1 / double(this->dx);
@@ -73,7 +74,7 @@ struct ParticleInversion : ParticleSweep<S, Precision, Material, K, packed> {
     Mat3<double> const C = cofactor(F), c = cofactor(dF);
     double const det = dot(F.column(0), C.column(0));
     if (!(det > 0)) return strict ? 0 : infinity;
-    return smallest_positive_root(det, contract(C, dF), contract(F, c), determinant(dF));
+    return smallest_positive_root(det, contract(C, dF), contract(F, c), determinant(dF), shortest);
   }
 
   KOKKOS_FUNCTION void operator()(typename S::team_member const& team) const {
@@ -102,7 +103,7 @@ struct ParticleInversion : ParticleSweep<S, Precision, Material, K, packed> {
       int const slots = this->blocks.slot_begin(patch);
       length = at_most;
       auto const solve = [&](int k) {
-        length = Kokkos::min(length, step_to_flat(slots + k, node));
+        length = Kokkos::min(length, step_to_flat(slots + k, node, length));
       };
       Kokkos::parallel_for(Kokkos::TeamThreadRange(team, this->blocks.count(patch)), solve);
       if (team.team_size() > 1) team.team_reduce(Kokkos::Min<double>(length));

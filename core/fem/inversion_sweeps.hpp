@@ -88,7 +88,8 @@ struct InversionSweep : PatchSweep<S, typename Precision::real> {
     return d;
   }
 
-  KOKKOS_FORCEINLINE_FUNCTION double step_to_flat(int e, int const* vertex) const {
+  /// What is beyond `shortest` may be answered by infinity.
+  KOKKOS_FORCEINLINE_FUNCTION double step_to_flat(int e, int const* vertex, double shortest) const {
     constexpr int pack = Base::lanes;
     auto const& v = this->patches;
     std::uint16_t const* corner = v.corner.data() + std::size_t(e / pack) * 4 * pack + e % pack;
@@ -112,7 +113,7 @@ struct InversionSweep : PatchSweep<S, typename Precision::real> {
     double const det = sign * dot(D.column(0), C.column(0));
     if (!(det > 0)) return strict ? 0 : infinity;
     return smallest_positive_root(det, sign * contract(C, d), sign * contract(D, c),
-                                  sign * determinant(d));
+                                  sign * determinant(d), shortest);
   }
 
   KOKKOS_FUNCTION void operator()(typename S::team_member const& team) const {
@@ -135,7 +136,9 @@ struct InversionSweep : PatchSweep<S, typename Precision::real> {
     if (length < at_most) {
       int const* vertex = v.vertex.data() + v.local_begin(patch);
       length = at_most;
-      auto const solve = [&](int e) { length = Kokkos::min(length, step_to_flat(e, vertex)); };
+      auto const solve = [&](int e) {
+        length = Kokkos::min(length, step_to_flat(e, vertex, length));
+      };
       Kokkos::parallel_for(Kokkos::TeamThreadRange(team, v.pack_begin(patch) * Base::lanes,
                                                    v.pack_begin(patch + 1) * Base::lanes),
                            solve);

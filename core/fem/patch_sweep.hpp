@@ -149,9 +149,9 @@ struct PatchSweep {
                shape(g, 6), shape(g, 7), shape(g, 8)}};
     }
     KOKKOS_FORCEINLINE_FUNCTION Value volume(int g) const { return shape(g, 9); }
-    /// Asks for what is read next, of this patch or the one after it: hardware that follows a
-    /// stream of reads stops where a page ends, which these reach every few packs. Farther ahead
-    /// costs more than it saves.
+    /// Asks for what is read next, a line of the cache (64 bytes) of each number: hardware that
+    /// follows a stream of reads stops where a page ends, which these reach every few packs. After
+    /// the last pack it asks in vain. Farther ahead was slower.
     KOKKOS_FORCEINLINE_FUNCTION void ask_ahead(int g) const {
       constexpr int line = 64, pack = lanes * sizeof(Real), ahead = pack < line ? line / pack : 1;
       std::size_t const next = g / per_pack + ahead;

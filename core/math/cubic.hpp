@@ -9,10 +9,16 @@ namespace taut {
 
 /// Smallest t > 0 with a + b t + c t^2 + d t^3 <= 0, for a > 0; infinity if there is none. Never
 /// larger than the root by more than the rounding of the polynomial's evaluation: the lower end of
-/// the final bracket is returned. For a <= 0 the answer is 0. NaN coefficients give 0.
-KOKKOS_INLINE_FUNCTION double smallest_positive_root(double a, double b, double c, double d) {
+/// the final bracket is returned. For a <= 0 the answer is 0. NaN coefficients give 0. A root
+/// beyond `at_most` may be answered by infinity; others do not depend on it.
+KOKKOS_INLINE_FUNCTION double smallest_positive_root(
+    double a, double b, double c, double d,
+    double at_most = Kokkos::Experimental::infinity_v<double>) {
   constexpr double infinity = Kokkos::Experimental::infinity_v<double>;
-  if (!(a > 0) || !(Kokkos::abs(b) + Kokkos::abs(c) + Kokkos::abs(d) < infinity)) return 0;
+  double const b1 = Kokkos::abs(b), c1 = Kokkos::abs(c), d1 = Kokkos::abs(d);
+  if (!(a > 0) || !(b1 + c1 + d1 < infinity)) return 0;
+  // By one in a hundred, which no round-off comes near.
+  if (at_most * (b1 + at_most * (c1 + at_most * d1)) < 0.99 * a) return infinity;
   auto const f = [&](double t) { return a + t * (b + t * (c + t * d)); };
   // Between its stationary points a cubic is monotone: look for the first piece that ends below
   // zero.
@@ -27,9 +33,7 @@ KOKKOS_INLINE_FUNCTION double smallest_positive_root(double a, double b, double 
   }
   // No term takes more than its share, 1/2 + 1/4 + 1/8, of a before `low`. What is left is searched
   // by magnitude first: coefficients that are round-off put stationary points anywhere up to 1e300.
-  double const reach =
-      Kokkos::max(Kokkos::abs(b) / a,
-                  Kokkos::max(Kokkos::sqrt(Kokkos::abs(c) / a), Kokkos::cbrt(Kokkos::abs(d) / a)));
+  double const reach = Kokkos::max(b1 / a, Kokkos::max(Kokkos::sqrt(c1 / a), Kokkos::cbrt(d1 / a)));
   double low = reach > 0 ? 0.5 / reach : infinity, high = infinity;
   if (!(low < infinity)) return infinity;
   for (double s : stationary) {

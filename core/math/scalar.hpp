@@ -168,14 +168,14 @@ template <class T, class Abi>
 KOKKOS_FORCEINLINE_FUNCTION bool any_lane(
     Kokkos::Experimental::basic_simd_mask<T, Abi> const& mask) {
   // One instruction, where Kokkos asks lane after lane.
-#if defined(__AVX512F__) && !defined(__CUDACC__)
+#if defined(KOKKOS_ARCH_AVX512XEON) && !defined(__CUDACC__)
   if constexpr (requires { static_cast<__mmask16>(mask); }) {
     return static_cast<__mmask16>(mask) != 0;
   } else if constexpr (requires { static_cast<__mmask8>(mask); }) {
     return static_cast<__mmask8>(mask) != 0;
   }
 #endif
-#if defined(__AVX2__) && !defined(__CUDACC__)
+#if defined(KOKKOS_ARCH_AVX2) && !defined(__CUDACC__)
   if constexpr (requires { static_cast<__m256>(mask); }) {
     return _mm256_movemask_ps(static_cast<__m256>(mask)) != 0;
   } else if constexpr (requires { static_cast<__m256d>(mask); }) {

@@ -31,6 +31,9 @@ TEST_CASE("where a cubic first vanishes", "[math]") {
     double expected = infinity;
     for (double root : r) expected = root > 0 ? std::min(expected, root) : expected;
     double const found = smallest_positive_root(a, b, c, s);
+    double const at_most = size * std::pow(10.0, 2 * uniform(rng));
+    double const near = smallest_positive_root(a, b, c, s, at_most);
+    CHECK((found <= at_most ? near == found : near > at_most));
     if (k % 10 == 0 && found > expected * (1 + 1e-6)) {
       // A double root may be missed by rounding, where the polynomial only touches zero.
       CHECK_THAT(r[0], WithinRel(expected, 1e-6));

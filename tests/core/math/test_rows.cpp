@@ -44,10 +44,10 @@ void check_add(Rows<T>& rows) {
   constexpr int lanes = ScalarTraits<T>::lanes;
   for (int repeat = 0; repeat < 30; ++repeat) {
     rows.draw(repeat);
-    // `row` holds four numbers, whatever is used of them.
-    T row[4];
-    std::vector<Real> const source = rows.numbers(4 * lanes);
-    for (int c = 0; c < 4; ++c) row[c] = load<T>(source.data() + c * lanes);
+    // `row` holds twelve numbers, whatever is used of them.
+    T row[12];
+    std::vector<Real> const source = rows.numbers(12 * lanes);
+    for (int c = 0; c < 12; ++c) row[c] = load<T>(source.data() + c * lanes);
     std::vector<Real> to = rows.numbers(4 * scale * rows.count + 4), expected = to;
     for (int i = 0; i < lanes; ++i)
       for (int c = 0; c < numbers; ++c) {
@@ -64,6 +64,19 @@ void check_scale(Rows<T>& rows) {
   check_add<2, scale>(rows);
   check_add<3, scale>(rows);
   check_add<4, scale>(rows);
+}
+
+/// Rows that take several quads each.
+template <int scale, class T>
+void check_long_rows(Rows<T>& rows) {
+  check_add<5, scale>(rows);
+  check_add<6, scale>(rows);
+  check_add<7, scale>(rows);
+  check_add<8, scale>(rows);
+  if constexpr (scale > 2) {
+    check_add<9, scale>(rows);
+    check_add<12, scale>(rows);
+  }
 }
 
 }  // namespace
@@ -90,6 +103,8 @@ TEMPLATE_TEST_CASE("add_rows adds lane after lane, also to one row", "[math]", f
   check_scale<1>(rows);
   check_scale<2>(rows);
   check_scale<3>(rows);
+  check_long_rows<2>(rows);
+  check_long_rows<3>(rows);
 }
 
 TEMPLATE_TEST_CASE("load_row_pairs gathers both vectors of rows of eight", "[math]", float, double,
