@@ -85,7 +85,10 @@ KOKKOS_INLINE_FUNCTION float round_down(double v) {
   if (v < -double(largest)) return -Kokkos::Experimental::infinity_v<float>;
   float const nearest = static_cast<float>(v);
   if (double(nearest) <= v) return nearest;
-  return Kokkos::nextafter(nearest, -Kokkos::Experimental::infinity_v<float>);
+  // The next one below, by its bits: std::nextafter would be a call for each number of each box.
+  if (nearest == 0) return -Kokkos::Experimental::denorm_min_v<float>;
+  auto const bits = Kokkos::bit_cast<std::uint32_t>(nearest);
+  return Kokkos::bit_cast<float>(nearest > 0 ? bits - 1 : bits + 1);
 }
 KOKKOS_FORCEINLINE_FUNCTION float round_up(double v) { return -round_down(-v); }
 

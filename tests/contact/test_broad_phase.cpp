@@ -13,8 +13,10 @@
 #include <catch2/matchers/catch_matchers_string.hpp>
 
 #include <algorithm>
+#include <cmath>
 #include <cstdlib>
 #include <limits>
+#include <random>
 
 using namespace taut;
 using namespace taut::soups;
@@ -88,6 +90,28 @@ double box_gap(Pair const& pair, std::vector<Point> const& x, std::vector<Point>
 }
 
 }  // namespace
+
+TEST_CASE("bounds are rounded to the next float outwards, and no farther", "[contact]") {
+  constexpr double infinity = std::numeric_limits<double>::infinity();
+  constexpr float largest = std::numeric_limits<float>::max();
+  std::mt19937_64 random(9);
+  std::vector<double> numbers = {
+      0.0, -0.0, 1.0, -1.0, double(largest), -double(largest), 1e300, -1e300, infinity, -infinity};
+  for (int k = 0; k < 100000; ++k) {
+    // Of any size from far below the smallest float on.
+    double const exponent = std::uniform_real_distribution<double>(-60, 38)(random);
+    double const mantissa = std::uniform_real_distribution<double>(-1, 1)(random);
+    numbers.push_back(mantissa * std::pow(10.0, exponent));
+    numbers.push_back(double(static_cast<float>(numbers.back())));
+  }
+  for (double v : numbers) {
+    float const down = kernels::round_down(v), up = kernels::round_up(v);
+    if (!(double(down) <= v && v <= double(up))) FAIL(v);
+    bool const tight = (v > double(largest) || double(std::nextafter(down, largest)) > v) &&
+                       (v < -double(largest) || double(std::nextafter(up, -largest)) < v);
+    if (v != down && !tight) FAIL(v << " is not as tight as it can be");
+  }
+}
 
 TEMPLATE_TEST_CASE("no search misses a close pair, and all find the same", "[contact]",
                    (std::pair<Fp64, Left>), (std::pair<Fp64, Right>), (std::pair<Mixed, Right>),
