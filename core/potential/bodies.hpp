@@ -164,7 +164,7 @@ public:
   /// `functor(i, Sums<T, K>& sums)` adds the terms of unknown i. Sum k of body b is at K b + k of
   /// what is returned, which lasts until the next sum. Throws Error for too many sums.
   template <int K, class Functor>
-  std::span<T const> sum(char const* name, Functor const& functor) const {
+  std::span<T const> sum(char const* name, Functor const& functor) const& {
     if (K > max_sums_) {
       throw Error("{}: memory for {} sums of each body cannot take {}: construct it for as many",
                   name, max_sums_, K);
@@ -177,6 +177,9 @@ public:
     S::instance().fence("taut: sums over bodies");
     return {host_.data(), std::size_t(K) * bodies_.count};
   }
+  /// What is returned would be gone with a temporary.
+  template <int K, class Functor>
+  std::span<T const> sum(char const* name, Functor const& functor) const&& = delete;
 
 private:
   using View = Kokkos::View<T*, typename S::memory>;

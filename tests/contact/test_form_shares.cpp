@@ -28,7 +28,7 @@ TEST_CASE("bodies are what elements connect, and the rest together", "[islands]"
   std::vector<double> sum(3);
   for (int i = 0; i < n; ++i)
     sum[i % 3] += shares(i) = std::uniform_int_distribution(-9, 9)(random);
-  auto const sums = BodySums<DefaultSpace, double>(strands, 1)
-                        .sum<1>("test", kernels::SumShares<DefaultSpace>{shares});
+  BodySums<DefaultSpace, double> const by_strand(strands, 1);
+  auto const sums = by_strand.sum<1>("test", kernels::SumShares<DefaultSpace>{shares});
   for (int b = 0; b < 3; ++b) CHECK(sums[b] == sum[b]);
 }
