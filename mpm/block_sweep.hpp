@@ -69,9 +69,11 @@ struct BlockSweep {
   KOKKOS_FORCEINLINE_FUNCTION int groups(int patch) const {
     return (blocks.slot_end(patch) - blocks.slot_begin(patch)) / width;
   }
-  /// A local node of the patch that certainly is a node of the grid.
+  /// A local node of the patch that certainly is a node of the grid, and of which its first
+  /// particle sees much: nodes that hardly any particle sees may be far off.
   KOKKOS_FORCEINLINE_FUNCTION int first_node(int patch) const {
-    return blocks.corner(blocks.slot_begin(patch)) / 4;
+    constexpr int middle = K::width / 2;
+    return blocks.corner(blocks.slot_begin(patch)) / 4 + Views::local(middle, middle, middle);
   }
 
   /// Copies what `field(node, c)` says of the nodes of the patch, less that of one of them, into

@@ -36,17 +36,14 @@ struct PreparePoints {
 
   KOKKOS_FUNCTION void operator()(int slot) const {
     constexpr int lanes = BlockSweep<S, Real, K, false>::lanes;
-    int const p = blocks.particle(slot);
-    // What fills a pack up goes where a particle of it goes: anywhere else a node that hardly any
-    // particle sees could invert it, and no volume times no number is no number.
-    int const like = p >= 0 ? p : blocks.particle(slot / lanes * lanes);
+    int const p = blocks.particle(slot), like = blocks.like(slot);
     Real* const to = data.data() + std::size_t(slot / lanes) * point_numbers * lanes + slot % lanes;
     for (int c = 0; c < 3; ++c) {
-      double const x = like >= 0 ? double(particles.x(like, c)) * per_dx : K::start + 0.5;
+      double const x = double(particles.x(like, c)) * per_dx;
       to[c * lanes] = static_cast<Real>((x - base_node<K>(x)) - K::start);
     }
     for (int k = 0; k < 9; ++k) {
-      to[(3 + k) * lanes] = like >= 0 ? static_cast<Real>(particles.F(like, k)) : Real(k % 4 == 0);
+      to[(3 + k) * lanes] = static_cast<Real>(particles.F(like, k));
     }
     to[12 * lanes] =
         p >= 0 ? static_cast<Real>(double(particles.volume(p)) * double(particles.stiffness(p)))
@@ -95,8 +92,6 @@ public:
   using Blocks = BlockField<Real, Space>;
   using Matrix = BlockCsr<Space, double>;
   using MaterialParameters = typename Material::template Parameters<double>;
-  /// What ParticleBlocks are to be padded to.
-  static constexpr int lanes = kernels::BlockSweep<Space, Real, K, packed_>::lanes;
 
   /// The materials are numbers `first_material`, that plus 1, and so on of the particles.
   /// `team_size`: threads per patch where not packed; 0: one on the host, 64 on a device. Throws
@@ -139,8 +134,7 @@ public:
     rest_ = rest;
     dx_ = grid.dx;
     ++version_;
-    int const slots = (blocks_.slots + lanes - 1) / lanes * lanes;
-    grow(data_, "particle_data", std::size_t(kernels::point_numbers) * slots);
+    grow(data_, "particle_data", std::size_t(kernels::point_numbers) * blocks_.slots);
     for_each<Space>(
         "prepare_points", blocks_.slots,
         kernels::PreparePoints<Space, Precision, K>{blocks_, particles, 1 / dx_, data_});
@@ -150,7 +144,8 @@ public:
     }
     grow(bounds_, "particle_bounds", blocks_.patches);
     if constexpr (RememberingMaterial<Material>) {
-      grow(memory_.data, "particle_memory", std::size_t(memory_.numbers) * slots);
+      grow(memory_.data, "particle_memory", std::size_t(memory_.numbers) * blocks_.slots);
+      constexpr int lanes = kernels::BlockSweep<Space, Real, K, packed_>::lanes;
       using Kernel_ = kernels::Remember<Space, Precision, Material, K, lanes>;
       for_each<Space>("remember", blocks_.patches,
                       Kernel_{blocks_, particles, materials_, memory_});
@@ -222,13 +217,13 @@ public:
     run("particle_product", Kernel_{frame(x), p, static_cast<Real>(scale), partial_});
     gather<3>({{}, fixed, hp, {}, {}});
   }
-  /// The Hessian at x as the numbers of a ParticleOperator over Real.
+  /// The Hessian at x as the numbers of a ParticleOperator, of Real or rounded.
   template <class Operator>
   void linearise(Positions const& x, double scale, Operator& to) const {
-    static_assert(std::same_as<typename Operator::T, Real>);
     to.resize(all_, grid_, team_size_);
-    using Kernel_ = kernels::LineariseParticles<Space, Precision, Material, K, packed_>;
-    run("particle_linearise", Kernel_{frame(x), static_cast<Real>(scale), to.numbers()});
+    using To = typename Operator::T;
+    using Kernel_ = kernels::LineariseParticles<Space, Precision, Material, K, packed_, To>;
+    run("particle_linearise", Kernel_{frame(x), static_cast<Real>(scale), {to.numbers()}});
   }
   /// A splitting begins at x (particle_split.hpp), with `stiffness` times |d2Psi/dF2 (I)| / 3 of
   /// each material, which is near Young's modulus, between F and what stands for it: `state` is
@@ -242,9 +237,10 @@ public:
     grow(state.stiffness, "split_stiffness", std::max(all_.materials, range_.end));
     for_each<Space>("split_stiffness", static_cast<int>(norms_.extent(0)),
                     kernels::ScaleNorms<Space>{norms_, own_of(state), stiffness / 3});
-    using Kernel_ = kernels::LineariseSplit<Space, Precision, Material, K, packed_>;
+    using Kernel_ =
+        kernels::LineariseSplit<Space, Precision, Material, K, packed_, typename Operator::T>;
     run("split_linearise",
-        Kernel_{frame(x), own_of(state), static_cast<Real>(scale), to.numbers()});
+        Kernel_{frame(x), own_of(state), static_cast<Real>(scale), {to.numbers()}});
   }
   /// Brings `state` up to x, and takes the gradient g of the potential to that of the split
   /// function.

@@ -194,9 +194,8 @@ public:
   }
 
 private:
-  static constexpr int lanes = kernels::BlockSweep<S, T, K, false>::lanes;
   struct Grid {
-    ParticleBlocks<K, S> blocks{lanes};
+    ParticleBlocks<K, S> blocks;
     SparseGrid<S> nodes;
     GridTransfer<K, P, S> transfer;
     Operator hessian;

@@ -55,7 +55,7 @@ public:
                           typename Policies::Embedding, T>;
 
   struct Params {
-    Refresh refresh = Refresh::lagged(8);
+    Refresh refresh = Refresh::rarely();
     /// Those that the unknowns are, whenever `update` is called: of the grid that outlives this.
     GridNodes<S> const* nodes = nullptr;
     typename Cycle::Params cycle = {};

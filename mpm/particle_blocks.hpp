@@ -19,6 +19,7 @@
 #include <taut/core/exec/growing.hpp>
 #include <taut/core/exec/sort.hpp>
 #include <taut/core/math/matrix.hpp>
+#include <taut/core/math/scalar.hpp>
 #include <taut/mpm/grid_nodes.hpp>
 #include <taut/mpm/spline.hpp>
 
@@ -38,6 +39,9 @@ struct BlockViews {
   KOKKOS_FORCEINLINE_FUNCTION static constexpr int local(int i, int j, int k) {
     return (i * side + j) * side + k;
   }
+  /// Particles of a patch are padded to a multiple of this, the widest pack of any scalar: what is
+  /// computed in double may be kept for packs of floats.
+  static constexpr int lanes = S::on_host ? host_lanes<float> : 32;
 
   int patches = 0, blocks = 0, materials = 0;
   int slots = 0;               ///< places for particles, padding included
@@ -55,6 +59,13 @@ struct BlockViews {
   List<int> node;            ///< per block and local node: number in the grid, or -1
   List<int> row_begin, row;  ///< per node of the grid: its rows, patch * nodes + local
 
+  /// The particle of a slot. What fills a pack up is like the first particle of it, no matter what
+  /// it weighs: anywhere else a node that hardly any particle sees could invert it, and no volume
+  /// times no number is no number.
+  KOKKOS_FORCEINLINE_FUNCTION int like(int slot) const {
+    int const p = particle(slot);
+    return p >= 0 ? p : particle(slot / lanes * lanes);
+  }
   KOKKOS_FORCEINLINE_FUNCTION int const* nodes_of(int patch) const {
     return node.data() + std::size_t(nodes) * block(patch);
   }
@@ -277,9 +288,6 @@ public:
   /// Cells may be this far from the origin, in either direction.
   static constexpr int farthest = (1 << 29) - 64;
 
-  /// `lanes`: particles of a patch are padded to a multiple of this.
-  explicit ParticleBlocks(int lanes = 1) : lanes_(lanes) {}
-
   /// Sorts the first `count` particles at x (m) on a grid of spacing dx (m); `material` is in [0,
   /// materials). Throws Error for a particle that is nowhere, or whose material does not exist.
   template <class Positions>
@@ -297,7 +305,6 @@ public:
   Views const& views() const { return views_; }
 
 private:
-  int lanes_;
   Views views_;
   int cell_count_ = 0;
   Cells cell_, base_;
@@ -378,7 +385,7 @@ void ParticleBlocks<K, S>::sort(Positions const& x, List<int const> const& mater
       "begin_patches", count,
       kernels::BeginPatches<K, S>{make, patch_changes, block_changes, cell_changes, patches_before_,
                                   blocks_before_, cells_before_, first_, views_, base_});
-  kernels::PaddedCount<S> const counts{first_, patches, count, lanes_};
+  kernels::PaddedCount<S> const counts{first_, patches, count, Views::lanes};
   views_.slots = exclusive_scan<S, int>("slot_begin", patches, counts, views_.slot_begin);
   using Part = Kokkos::pair<int, int>;
   assign_on<S>(Kokkos::subview(views_.slot_begin, Part(patches, patches + 1)), views_.slots);

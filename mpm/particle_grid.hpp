@@ -91,8 +91,8 @@ public:
   using Positions = VectorField<typename Precision::position, Space>;
   using Blocks = ParticleBlocks<K, Space>;
 
-  /// `dx`: spacing, m; `lanes`: those of the terms over the particles. Throws Error unless dx > 0.
-  ParticleGrid(double dx, int lanes) : dx_(dx), blocks_(lanes) {
+  /// `dx`: spacing, m. Throws Error unless dx > 0.
+  explicit ParticleGrid(double dx) : dx_(dx) {
     if (!(dx > 0) || !std::isfinite(dx)) {
       throw Error("a grid of spacing {} m; give one above 0", dx);
     }

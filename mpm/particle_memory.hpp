@@ -58,8 +58,7 @@ struct Remember {
   KOKKOS_FUNCTION void operator()(int patch) const {
     auto const material = materials(blocks.material(patch));
     for (int slot = blocks.slot_begin(patch); slot < blocks.slot_end(patch); ++slot) {
-      int const own = blocks.particle(slot);
-      int const p = own >= 0 ? own : blocks.particle(slot / lanes * lanes);  // fills a pack up
+      int const p = blocks.like(slot);
       memory.template write<lanes>(slot, Material::remember(material, matrix_at(particles.F, p),
                                                             double(particles.plastic(p))));
     }

@@ -1,7 +1,8 @@
 // The multigrid cycle as a preconditioner of any minimiser over particles, made from these at once:
-// by default without a fine matrix, whose level is smoothed by Chebyshev's polynomial on products
-// with 45 numbers per particle (and patches where cells are cut, if asked for: cut_cells.hpp),
-// above coarser levels in float that are assembled from the particles and smoothed by Gauss-Seidel.
+// by default in float and without a fine matrix, whose level is smoothed by Chebyshev's polynomial
+// on products with 45 numbers per particle (and patches where cells are cut, if asked for:
+// cut_cells.hpp), above coarser levels that are assembled from the particles and smoothed by
+// Gauss-Seidel.
 // `assembled`: with the fine matrix, as HOT has it (Wang et al. 2020).
 //
 // For potentials in which each material is one term's, a ghost penalty may hold light nodes, and
@@ -18,15 +19,17 @@
 
 namespace taut {
 
-/// `T` is the scalar of the coarser levels; the fine one has that of the gradient.
+/// `T` is the scalar of the coarser levels, `FineT` that of the fine one. Floats do for a
+/// metric: iterations are the same, and what a step ends at is the gradient's to say.
 template <bool assembled_ = false, class FineSmoother_ = Chebyshev,
           class Smoother_ = ForwardBackward, class Embedding_ = LinearEmbedding, class T = float,
-          Spline K = QuadraticSpline>
+          Spline K = QuadraticSpline, class FineT = T>
 struct ParticleCyclePolicies {
   using FineSmoother = FineSmoother_;
   using Smoother = Smoother_;
   using Embedding = Embedding_;
   using Scalar = T;
+  using FineScalar = FineT;
   using Kernel = K;
   static constexpr bool assembled = assembled_;
 };
@@ -36,8 +39,8 @@ struct ParticleCyclePolicies {
 /// apart in a body, or of bodies that lie side by side, fall together on the levels below it, which
 /// hold stiff parts of it together by soft ones.
 struct Strengthening {
-  /// The update of a minimisation from which on the cycle is a strong one: with 1 always, with 2
-  /// where it did not come to its end while the first was kept; 0: never.
+  /// Once the cycle has been applied so often in a minimisation, every update makes it strong; 1:
+  /// it always is, 0: it never is.
   int from = 0;
   double light = 0.1;       ///< what LightNodes takes
   int most_light = 3000;    ///< nodes; the cycle stays plain where there are more
@@ -53,15 +56,16 @@ public:
   using Real = typename P::real;
   using Kernel = typename Policies::Kernel;
   using Vectors = VectorField<Real, S>;
-  using Operator = ParticleOperator<Kernel, Real, S>;
+  using FineReal = typename Policies::FineScalar;
+  using Operator = ParticleOperator<Kernel, FineReal, S>;
   static constexpr bool assembled = Policies::assembled;
-  using Fine = std::conditional_t<assembled, MatrixLevel<S, Real, Kernel::width - 1>,
-                                  PatchedLevel<Operator, S, Real, Kernel::width - 1>>;
+  using Fine = std::conditional_t<assembled, MatrixLevel<S, FineReal, Kernel::width - 1>,
+                                  PatchedLevel<Operator, S, FineReal, Kernel::width - 1>>;
   using Cycle = Multigrid<Fine, typename Policies::FineSmoother, typename Policies::Smoother,
                           typename Policies::Embedding, typename Policies::Scalar>;
 
   struct Params {
-    Refresh refresh = Refresh::lagged(8);
+    Refresh refresh = Refresh::rarely();
     CutCells cut_cells = {};           ///< where there is no fine matrix
     Strengthening strengthening = {};  ///< the same
     /// Coarser levels from the particles by their own kernels instead of P'AP
@@ -71,6 +75,7 @@ public:
     typename Cycle::Params cycle = {};
   };
   static constexpr char const* name = "particle_multigrid";
+  static constexpr bool rounded = !std::same_as<FineReal, Real>;
 
   ParticleMultigrid() : ParticleMultigrid(Params()) {}
   /// Throws Error where levels are to be geometric and cannot be.
@@ -89,19 +94,22 @@ public:
 
   /// A minimisation begins.
   void start() {
-    updates_ = 0;
+    applied_ = kept_ = 0;
     strong_ = false;
   }
   /// Takes the Hessian at x, and builds the hierarchy.
   template <class E>
   void update(E& e, VectorField<typename P::position, S> const& x) {
     Strengthening const& strong = params_.strengthening;
-    int const age = ++updates_ - strong.from;
-    if (strong_ && !holds_hessian() && age % strong.keep != 0) return;
+    if (strong_ && params_.refresh.interval != 1 && ++kept_ < strong.keep) return;
+    kept_ = 0;
     operator_.linearise(e, x, local_);
     if constexpr (!assembled) {
-      strong_ =
-          strong.from > 0 && age >= 0 && light_.build(operator_, strong.light, strong.most_light);
+      strong_ = strong.from > 0 && applied_ + 1 >= strong.from &&
+                light_.build(operator_, strong.light, strong.most_light);
+      if (rounded && strong_) {
+        for (auto& v : rounded_) grow(v, "rounded_vector", operator_.nodes().count);
+      }
       cycle_.set_sparse_nodes(strong_ ? strong.sparse_nodes : params_.cycle.sparse_nodes);
     }
     if constexpr (assembled) {
@@ -125,14 +133,24 @@ public:
 
   /// z = P g. Allocates nothing.
   void apply(Vectors const& g, Vectors const& z) const {
+    ++applied_;
     if (!strong_) return cycle_.apply(g, z);
-    light_.apply(
-        g, z, [&](Vectors const& x, Vectors const& y) { operator_.product(x, y); },
-        [&](Vectors const& r, Vectors const& x) { cycle_.apply(r, x); });
+    if constexpr (rounded) {
+      int const n = fine_.size();
+      for_each<S>("round_gradient", n, kernels::ConvertVectors<S, Real, FineReal>{g, rounded_[0]});
+      apply_strong(rounded_[0], rounded_[1]);
+      for_each<S>("round_gradient", n, kernels::ConvertVectors<S, FineReal, Real>{rounded_[1], z});
+    } else {
+      apply_strong(g, z);
+    }
   }
 
-  bool holds_hessian() const { return params_.refresh.interval == 1; }
-  void hessian_product(Vectors const& d, Vectors const& hd) const { fine_.product(d, hd); }
+  /// Whether it is made anew in every iteration, and what it is made of is the Hessian there; not
+  /// where that is rounded.
+  bool holds_hessian() const requires(!rounded) { return params_.refresh.interval == 1; }
+  void hessian_product(Vectors const& d, Vectors const& hd) const requires(!rounded) {
+    fine_.product(d, hd);
+  }
 
   MultigridReport const& report() const { return cycle_.report(); }
   /// Whether the last update has strengthened the cycle.
@@ -144,8 +162,17 @@ public:
   Operator const& hessian() const { return operator_; }
 
 private:
-  static constexpr bool may_be_geometric = assembled && Cycle::radius == Kernel::width - 1 &&
+  static constexpr bool may_be_geometric = assembled && !rounded &&
+                                           Cycle::radius == Kernel::width - 1 &&
                                            std::same_as<typename Policies::Scalar, Real>;
+  using FineVectors = VectorField<FineReal, S>;
+
+  void apply_strong(FineVectors const& g, FineVectors const& z) const {
+    light_.apply(
+        g, z, [&](FineVectors const& x, FineVectors const& y) { operator_.product(x, y); },
+        [&](FineVectors const& r, FineVectors const& x) { cycle_.apply(r, x); });
+  }
+
   struct NoLevels {};
   using Levels = std::conditional_t<may_be_geometric, GeometricLevels<Kernel, P, S>, NoLevels>;
 
@@ -157,8 +184,10 @@ private:
   Operator operator_;
   Fine fine_;
   Cycle cycle_;
-  LightNodes<S, Real, Kernel::width - 1> light_;
-  int updates_ = 0;  ///< of this minimisation
+  LightNodes<S, FineReal, Kernel::width - 1> light_;
+  FineVectors rounded_[2];   ///< what a strong cycle starts from, and what it makes of it
+  mutable int applied_ = 0;  ///< times in this minimisation
+  int kept_ = 0;             ///< updates that a strong cycle has seen
   bool strong_ = false;
 };
 

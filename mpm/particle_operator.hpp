@@ -1,7 +1,8 @@
 // The Hessian at an iterate without a matrix: the numbers of particle_operator_kernels.hpp, and a
 // block for each node of what acts on it alone (inertia, slip); a ghost penalty besides. What
 // ActionLevel takes as the fine level of a hierarchy: products, diagonal blocks, and the matrix of
-// the next coarser level from the particles at once. The fine matrix, too, where it is wanted.
+// the next coarser level from the particles at once. The fine matrix, too, where it is wanted. Of
+// the scalar of the gradient or rounded to float, which halves the bytes that a product reads.
 //
 // Who the particles are of is not known here: terms write the numbers (linearise), each those of
 // its materials.
@@ -31,9 +32,7 @@ public:
     blocks_ = blocks;
     nodes_ = nodes;
     team_size_ = packed ? 1 : team_size;
-    constexpr int lanes = kernels::BlockSweep<S, T, K, packed>::lanes;
-    int const slots = (blocks.slots + lanes - 1) / lanes * lanes;
-    grow(numbers_, "operator_numbers", std::size_t(kernels::operator_numbers) * slots);
+    grow(numbers_, "operator_numbers", std::size_t(kernels::operator_numbers) * blocks.slots);
     grow(partial_, "operator_partial", std::size_t(6) * BlockViews<K, S>::nodes * blocks.patches);
   }
   List<T> const& numbers() const { return numbers_; }
@@ -44,10 +43,10 @@ public:
     fixed_ = fixed;
   }
 
-  /// Becomes the Hessian of a potential at x; `local` is room for the blocks of single nodes, which
-  /// it goes on reading.
-  template <class E, class Positions>
-  void linearise(E& e, Positions const& x, Blocks const& local) {
+  /// Becomes the Hessian of a potential at x; `local` is room for the blocks of single nodes, in
+  /// the scalar of its gradient, which it goes on reading.
+  template <class E, class Positions, class Real>
+  void linearise(E& e, Positions const& x, BlockField<Real, S> const& local) {
     std::vector<int> terms_of;
     if constexpr (ShowsTerms<E>) {
       terms_of = terms_of_materials(e);
@@ -65,7 +64,13 @@ public:
       throw Error("the particles are sorted by {} materials, of which terms hold {}",
                   blocks_.materials, terms_of.size());
     }
-    set_local(local, e.fixed());
+    if constexpr (std::same_as<Real, T>) {
+      set_local(local, e.fixed());
+    } else {
+      Blocks const rounded = local_memory_.resize("operator_local", local.extent(0));
+      for_each<S>("round_blocks", nodes_.count, kernels::RoundBlocks<S, Real, T>{local, rounded});
+      set_local(rounded, e.fixed());
+    }
   }
   /// Rows of a ghost penalty, times `scale`; those of before until they are told anew.
   void set_ghosts(GhostRows<S> const& rows, double scale) {
@@ -171,6 +176,7 @@ private:
   int team_size_ = 1;
   List<T> numbers_, partial_;
   Blocks local_;
+  Resizable<Blocks> local_memory_;  ///< where they are rounded
   GhostRows<S> ghosts_;
   double ghost_scale_ = 1;
 };

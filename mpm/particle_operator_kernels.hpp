@@ -17,8 +17,23 @@ KOKKOS_FORCEINLINE_FUNCTION constexpr int operator_number(int q, int r) {
   return q >= r ? 3 + q * (q + 1) / 2 + r : 3 + r * (r + 1) / 2 + q;
 }
 
-/// Writes them.
-template <class S, class Precision, class Material, Spline K, bool packed>
+/// Where they are written to, one or a pack at a time: [pack of T][number][lane].
+template <class S, class T>
+struct OperatorNumbers {
+  static constexpr int lanes = S::on_host ? host_lanes<T> : 32;
+  Kokkos::View<T*, typename S::memory> to;
+
+  /// Number k of the particles from `slot` on.
+  template <class Value>
+  KOKKOS_FORCEINLINE_FUNCTION void set(int slot, int k, Value const& value) const {
+    store_as(value,
+             to.data() + (std::size_t(slot / lanes) * operator_numbers + k) * lanes + slot % lanes);
+  }
+};
+
+/// Writes them, as numbers of To.
+template <class S, class Precision, class Material, Spline K, bool packed,
+          class To = typename Precision::real>
 struct LineariseParticles : ParticleSweep<S, Precision, Material, K, packed> {
   using Base = ParticleSweep<S, Precision, Material, K, packed>;
   using Real = typename Base::Real;
@@ -26,7 +41,7 @@ struct LineariseParticles : ParticleSweep<S, Precision, Material, K, packed> {
   using Local = typename Base::Local;
 
   Real scale;  ///< h^2
-  Kokkos::View<Real*, typename S::memory> to;
+  OperatorNumbers<S, To> to;
 
   std::size_t scratch_bytes() const { return Base::row_bytes(3); }
 
@@ -37,10 +52,8 @@ struct LineariseParticles : ParticleSweep<S, Precision, Material, K, packed> {
     team.team_barrier();
     auto const of_patch = this->material(patch);
     auto const points = this->points(patch, this->data.data());
-    Real* const out = to.data() + std::size_t(operator_numbers) * this->blocks.slot_begin(patch);
     auto const body = [&](int g) __attribute__((always_inline)) {
-      Real* const own = out + std::size_t(g / Base::per_pack) * operator_numbers * Base::lanes +
-                        g % Base::per_pack * Base::width;
+      int const slot = this->blocks.slot_begin(patch) + g * Base::width;
       Mat3<T> const before = points.deformation(g);
       auto const state = Material::evaluate(
           this->own(of_patch, patch, g),
@@ -48,15 +61,13 @@ struct LineariseParticles : ParticleSweep<S, Precision, Material, K, packed> {
       auto const frame = Material::frame(state);
       T const weight = T(scale / (this->dx * this->dx)) * points.weight(g);
       Mat3<T> const to_b = transpose(before);
-      for (int k = 0; k < 3; ++k) store(points.number(g, k), own + k * Base::lanes);
+      for (int k = 0; k < 3; ++k) to.set(slot, k, points.number(g, k));
       for (int r = 0; r < 9; ++r) {
         Mat3<T> dF;
         for (int i = 0; i < 3; ++i)
           for (int c = 0; c < 3; ++c) dF(i, c) = i == r % 3 ? before(r / 3, c) : T(0);
         Mat3<T> const f = frame.apply(dF) * to_b;
-        for (int q = r; q < 9; ++q) {
-          store(T(weight * f.a[q]), own + operator_number(q, r) * Base::lanes);
-        }
+        for (int q = r; q < 9; ++q) to.set(slot, operator_number(q, r), T(weight * f.a[q]));
       }
     };
     Kokkos::parallel_for(Kokkos::TeamThreadRange(team, this->groups(patch)), body);
@@ -81,6 +92,16 @@ struct OperatorSweep : BlockSweep<S, T_, K, packed> {
   }
   KOKKOS_FORCEINLINE_FUNCTION static Weights<K, T> weights(T_ const* group) {
     return Weights<K, T>({number(group, 0), number(group, 1), number(group, 2)});
+  }
+};
+
+/// Blocks of another scalar.
+template <class S, class From, class To>
+struct RoundBlocks {
+  BlockField<From, S> from;
+  BlockField<To, S> to;
+  KOKKOS_FUNCTION void operator()(int i) const {
+    for (int k = 0; k < 6; ++k) to(i, k) = static_cast<To>(from(i, k));
   }
 };
 

@@ -152,7 +152,8 @@ struct SplitParticles : ParticleSweep<S, Precision, Material, K, packed> {
 
 /// Writes the Hessian of V k/2 |F(x) - Z + U|^2 as the numbers of a ParticleOperator:
 /// h^2 V k / dx^2 (F^n F^nT) (x) 1.
-template <class S, class Precision, class Material, Spline K, bool packed>
+template <class S, class Precision, class Material, Spline K, bool packed,
+          class To = typename Precision::real>
 struct LineariseSplit : ParticleSweep<S, Precision, Material, K, packed> {
   using Base = ParticleSweep<S, Precision, Material, K, packed>;
   using Real = typename Base::Real;
@@ -160,7 +161,7 @@ struct LineariseSplit : ParticleSweep<S, Precision, Material, K, packed> {
 
   Kokkos::View<double const*, typename S::memory> stiffness;
   Real scale;
-  Kokkos::View<Real*, typename S::memory> to;
+  OperatorNumbers<S, To> to;
 
   std::size_t scratch_bytes() const { return 0; }
 
@@ -168,18 +169,15 @@ struct LineariseSplit : ParticleSweep<S, Precision, Material, K, packed> {
     int const patch = team.league_rank();
     Real const k = static_cast<Real>(stiffness(this->blocks.material(patch)));
     auto const points = this->points(patch, this->data.data());
-    Real* const out = to.data() + std::size_t(operator_numbers) * this->blocks.slot_begin(patch);
     auto const body = [&](int g) __attribute__((always_inline)) {
-      Real* const own = out + std::size_t(g / Base::per_pack) * operator_numbers * Base::lanes +
-                        g % Base::per_pack * Base::width;
-      for (int c = 0; c < 3; ++c) store(points.number(g, c), own + c * Base::lanes);
+      int const slot = this->blocks.slot_begin(patch) + g * Base::width;
+      for (int c = 0; c < 3; ++c) to.set(slot, c, points.number(g, c));
       Mat3<T> const before = points.deformation(g);
       T const weight = T(k * scale / (this->dx * this->dx)) * points.weight(g);
       Mat3<T> const left = weight * (before * transpose(before));
       for (int r = 0; r < 9; ++r)
         for (int q = r; q < 9; ++q) {
-          store(q % 3 == r % 3 ? left(q / 3, r / 3) : T(0),
-                own + operator_number(q, r) * Base::lanes);
+          to.set(slot, operator_number(q, r), q % 3 == r % 3 ? left(q / 3, r / 3) : T(0));
         }
     };
     Kokkos::parallel_for(Kokkos::TeamThreadRange(team, this->groups(patch)), body);

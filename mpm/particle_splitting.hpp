@@ -10,7 +10,9 @@
 
 namespace taut {
 
-template <class P = Mixed, class S = DefaultSpace, class Policies = ParticleCyclePolicies<>>
+template <class P = Mixed, class S = DefaultSpace,
+          class Policies = ParticleCyclePolicies<false, Chebyshev, ForwardBackward, LinearEmbedding,
+                                                 float, QuadraticSpline, typename P::real>>
 class ParticleSplitting {
   using Multigrid_ = ParticleMultigrid<P, S, Policies>;
 
@@ -63,6 +65,7 @@ public:
 
 private:
   static_assert(!Policies::assembled, "taut: ParticleSplitting has no fine matrix");
+  static_assert(!Multigrid_::rounded, "taut: ParticleSplitting solves with its fine level");
   /// h^2 in front of all energies but that of inertia.
   template <class E>
   static double scale_of(E& e) {

@@ -30,4 +30,21 @@ double largest_tridiagonal(std::vector<double> const& diagonal, std::vector<doub
   return high;
 }
 
+RitzValue largest_ritz_value(std::vector<double> const& diagonal,
+                             std::vector<double> const& beside) {
+  std::size_t const n = diagonal.size();
+  double const value =
+      largest_tridiagonal(diagonal, {beside.begin(), beside.begin() + std::ptrdiff_t(n - 1)});
+  // The eigenvector row by row, of which the last number tells the residual.
+  double before = 0, last = 1, square = 1;
+  for (std::size_t i = 0; i + 1 < n && beside[i] > 0; ++i) {
+    double const next =
+        ((value - diagonal[i]) * last - (i > 0 ? beside[i - 1] * before : 0)) / beside[i];
+    before = last;
+    last = next;
+    square += next * next;
+  }
+  return {value, beside[n - 1] * std::abs(last) / std::sqrt(square)};
+}
+
 }  // namespace taut

@@ -15,25 +15,65 @@ namespace taut {
 /// `beside` has one entry less.
 double largest_tridiagonal(std::vector<double> const& diagonal, std::vector<double> const& beside);
 
+/// What Lanczos' method knows of the largest eigenvalue.
+struct RitzValue {
+  double value = 1;     ///< from below
+  double residual = 0;  ///< an eigenvalue lies within this of it
+};
+/// After as many steps as there are entries in both.
+RitzValue largest_ritz_value(std::vector<double> const& diagonal,
+                             std::vector<double> const& beside);
+
 namespace kernels {
 
 /// Numbers in [-1, 1] that follow from the place of a node alone.
+template <class S>
+KOKKOS_FUNCTION Vec3<double> scattered_numbers(GridNodes<S> const& nodes, int i) {
+  Vec3<double> numbers;
+  for (int c = 0; c < 3; ++c) {
+    unsigned h = LeafTable<S>::hash(8 * nodes.ijk(i, 0), 8 * nodes.ijk(i, 1), 8 * nodes.ijk(i, 2)) +
+                 0x9e3779b9u * static_cast<unsigned>(c + 1);
+    h ^= h >> 16;
+    h *= 0x7feb352du;
+    h ^= h >> 15;
+    h *= 0x846ca68bu;
+    h ^= h >> 16;
+    numbers[c] = 2 * (double(h) / 4294967295.0) - 1;
+  }
+  return numbers;
+}
 template <class S, class T>
 struct ScatterNumbers {
   GridNodes<S> nodes;
   VectorField<T, S> to;
   KOKKOS_FUNCTION void operator()(int i) const {
-    for (int c = 0; c < 3; ++c) {
-      unsigned h =
-          LeafTable<S>::hash(8 * nodes.ijk(i, 0), 8 * nodes.ijk(i, 1), 8 * nodes.ijk(i, 2)) +
-          0x9e3779b9u * static_cast<unsigned>(c + 1);
-      h ^= h >> 16;
-      h *= 0x7feb352du;
-      h ^= h >> 15;
-      h *= 0x846ca68bu;
-      h ^= h >> 16;
-      to(i, c) = T(2 * (double(h) / 4294967295.0) - 1);
-    }
+    Vec3<double> const u = scattered_numbers(nodes, i);
+    for (int c = 0; c < 3; ++c) to(i, c) = T(u[c]);
+  }
+};
+/// L u, where L L' = D and u are such numbers: as much for every node by the norm of D^-1. Light
+/// nodes, whose blocks may be 1e-10 of others, would be all that Lanczos starts from.
+template <class S, class T>
+struct ScatterResidual {
+  GridNodes<S> nodes;
+  BlockField<T, S> inverse;
+  VectorField<T, S> to;
+  KOKKOS_FUNCTION void operator()(int i) const {
+    Vec3<double> const u = scattered_numbers(nodes, i);
+    double m[6];
+    for (int k = 0; k < 6; ++k) m[k] = double(inverse(i, k));
+    // D^-1 = C C' with C upper triangular, and L = C^-T. Blocks were floored when inverted, so what
+    // is smaller is round-off.
+    auto const pivot = [](double rest, double all) {
+      return Kokkos::sqrt(Kokkos::max(rest, 1e-7 * all));
+    };
+    double const zz = pivot(m[2], m[2]), yz = m[4] / zz, xz = m[5] / zz;
+    double const yy = pivot(m[1] - yz * yz, m[1]), xy = (m[3] - xz * yz) / yy;
+    double const xx = pivot(m[0] - xy * xy - xz * xz, m[0]);
+    double const x = u[0] / xx, y = (u[1] - xy * x) / yy, z = (u[2] - xz * x - yz * y) / zz;
+    to(i, 0) = T(x);
+    to(i, 1) = T(y);
+    to(i, 2) = T(z);
   }
 };
 
@@ -108,13 +148,16 @@ concept PreconditionedLevel = LevelOperator<A> &&
     } -> std::convertible_to<VectorField<typename A::Scalar, typename A::Space>>;
 };
 
-/// The largest eigenvalue of D^-1 A, from below. Uses the vectors r, d and y.
+/// The largest eigenvalue of D^-1 A: a Ritz value and its residual, which is hardly ever below it,
+/// after so many steps at most, or once that residual is less than `enough` of the value. Uses the
+/// vectors r, d and y.
 template <LevelOperator A, class T, class S>
-double largest_eigenvalue(A const& a, LevelVectors<T, S> const& v, int steps = 20) {
+double largest_eigenvalue(A const& a, LevelVectors<T, S> const& v, int steps = 20,
+                          double enough = 0.05) {
   int const n = a.size();
   if (n == 0) return 1;
   Reducer<S> const reducer(n, 1);
-  for_each<S>("lanczos_start", n, kernels::ScatterNumbers<S, T>{a.nodes(), v.r});
+  for_each<S>("lanczos_start", n, kernels::ScatterResidual<S, T>{a.nodes(), a.inverse(), v.r});
   std::vector<double> diagonal, beside;
   kernels::LanczosResidual<S, T> residual{a.inverse(), v.r, v.y, T(0)};
   VectorField<T, S> z = v.y;
@@ -129,6 +172,7 @@ double largest_eigenvalue(A const& a, LevelVectors<T, S> const& v, int steps = 2
   };
   double rho = reduce();
   double beta = 0, alpha_before = 1;
+  RitzValue found;
   for (int k = 0; k < steps; ++k) {
     for_each<S>("lanczos_direction", n, kernels::LanczosDirection<S, T>{z, v.d, T(beta)});
     a.product(v.d, v.y);
@@ -143,10 +187,10 @@ double largest_eigenvalue(A const& a, LevelVectors<T, S> const& v, int steps = 2
     beside.push_back(std::sqrt(std::max(beta, 0.0)) / alpha);
     alpha_before = alpha;
     rho = next;
+    found = largest_ritz_value(diagonal, beside);
+    if (k > 0 && found.residual <= enough * found.value) break;
   }
-  if (diagonal.empty()) return 1;
-  beside.resize(diagonal.size() - 1);
-  return largest_tridiagonal(diagonal, beside);
+  return found.value + found.residual;
 }
 
 /// The same by power iteration, until a step changes the Rayleigh quotient d'A D^-1 A d / d'A d by

@@ -48,7 +48,7 @@ public:
       : options_(options),
         machine_(machine),
         particles_(strained_cube(cells)),
-        grid_(1.0 / cells, particle_lanes()),
+        grid_(1.0 / cells),
         potential_(make_potential()) {
     all_.threads = machine.threads;
     all_.cells = cells;

@@ -23,7 +23,7 @@ int main() {
   Particles<> const particles(sample({&ball, 1}, dx));
 
   using Solid = ElasticParticles<Elastic<FixedCorotated, FullProjection>>;
-  ParticleGrid<> grid(dx, Solid::lanes);
+  ParticleGrid<> grid(dx);
   Potential scene(grid.unknowns(), Inertia(grid.unknowns()),
                   BodyForce(grid.unknowns(), {0, -9.81, 0}), Solid({lame_parameters(1e5, 0.3)}),
                   GhostPenalty<>(), Slip<>());

@@ -37,13 +37,12 @@ struct ParticleMinimiserHolder final : ParticleMinimiser::Interface {
   }
 };
 
-/// The update of a step from which on the cycle is a strong one (ParticleMultigrid): after 400
-/// iterations, where cycles are renewed every 8. It costs as much as 50 to 80 plain iterations to
-/// make and three to apply: where the plain one gets there in fewer (twist: 340, chain: 381) it has
-/// not been faster.
+/// The iteration of a step from which on the cycle is a strong one (ParticleMultigrid). It costs as
+/// much as 50 to 80 plain iterations to make and three to apply: where the plain one gets there in
+/// fewer (twist: 340, chain: 381) it has not been faster.
 inline int strong_from(SolverOptions const& options) {
   std::string const& asked = options.text("strong_cycle");
-  return asked == "never" ? 0 : asked == "always" ? 1 : 51;
+  return asked == "never" ? 0 : asked == "always" ? 1 : 400;
 }
 
 /// What all of them take from the options.
@@ -87,7 +86,7 @@ protected:
   int window() const { return multigrid() ? 4 : 8; }
   int visits() const { return options_.text("cycle") == "w" ? 2 : 1; }
   ParticleMultigrid<P, S>::Params cycle() const {
-    return {.refresh = refresh_of(options_, Refresh::lagged(8)),
+    return {.refresh = refresh_of(options_, Refresh::rarely()),
             .strengthening = {.from = strong_from(options_)},
             .cycle = {.visits = visits()}};
   }

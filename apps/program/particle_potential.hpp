@@ -33,7 +33,10 @@ class ParticleTerms : public AnyTerms<ParticlePrecision, DefaultSpace> {
 public:
   using Points = Particles<ParticlePrecision, DefaultSpace>;
   using GridBlocks = ProgramGrid::Blocks;
-  using Operator = ParticleOperator<ParticleKernel, ParticlePrecision::real, DefaultSpace>;
+  template <class T>
+  using OperatorOf = ParticleOperator<ParticleKernel, T, DefaultSpace>;
+  using Operator = OperatorOf<ParticlePrecision::real>;
+  using Rounded = OperatorOf<float>;
   using Split = SplitParticleState<ParticlePrecision::real, DefaultSpace>;
   using Numbers = Array<double, DefaultSpace>;
 
@@ -50,7 +53,8 @@ public:
                            GridNodes<DefaultSpace> const& grid,
                            Positions const& rest) { held->update(particles, blocks, grid, rest); });
     linearised_.push_back(
-        [held](Positions const& x, double scale, Operator& to) { held->linearise(x, scale, to); });
+        {[held](Positions const& x, double scale, Operator& to) { held->linearise(x, scale, to); },
+         [held](Positions const& x, double scale, Rounded& to) { held->linearise(x, scale, to); }});
     split_.push_back(
         {[held](Positions const& x, double stiffness, double scale, Split& state, Operator& to) {
            held->start_split(x, stiffness, scale, state, to);
@@ -72,7 +76,10 @@ public:
 
   /// For preconditioners that are made of particles.
   void linearise(Positions const& x, double scale, Operator& to) const {
-    for (auto const& write : linearised_) write(x, scale, to);
+    for (LinearTerm const& term : linearised_) term.write(x, scale, to);
+  }
+  void linearise(Positions const& x, double scale, Rounded& to) const {
+    for (LinearTerm const& term : linearised_) term.write_rounded(x, scale, to);
   }
   /// For ADMM (mpm/particle_split.hpp).
   void start_split(Positions const& x, double stiffness, double scale, Split& state,
@@ -93,7 +100,11 @@ private:
   std::vector<std::function<void(Points const&, GridBlocks const&, GridNodes<DefaultSpace> const&,
                                  Positions const&)>>
       told_;
-  std::vector<std::function<void(Positions const&, double, Operator&)>> linearised_;
+  struct LinearTerm {
+    std::function<void(Positions const&, double, Operator&)> write;
+    std::function<void(Positions const&, double, Rounded&)> write_rounded;
+  };
+  std::vector<LinearTerm> linearised_;
   struct SplitTerm {
     std::function<void(Positions const&, double, double, Split&, Operator&)> start;
     std::function<void(Positions const&, double, double, bool, FixedMask<DefaultSpace> const&,
@@ -108,8 +119,6 @@ using ParticlePotential =
     Potential<Inertia<ParticlePrecision>, BodyForce<ParticlePrecision>, ParticleTerms,
               GhostPenalty<ParticleKernel, ParticlePrecision>, Slip<ParticlePrecision>>;
 
-/// What ParticleBlocks are to be padded to for them.
-int particle_lanes();
 /// Whether this model lets a material yield within the step that flows so after it.
 bool yields_in_step(std::string_view model, FlowKind kind);
 /// Adds the elastic term of a model (particle_models) over the materials that come next, which may

@@ -77,7 +77,7 @@ public:
         start_(start),
         particles_(start.list),
         born_("particle_born", start.born.size()),
-        grid_(points_.spacing, particle_lanes()),
+        grid_(points_.spacing),
         potential_(make_potential(start)),
         boundaries_(start.boundaries),
         stepper_(ImplicitEuler<ParticleMinimiser>(scene.solver, lagging()),

@@ -15,7 +15,6 @@ constexpr std::string_view hencky_plastic = "hencky_plastic";
 void add_plain_term(ParticleTerms& terms, std::string_view model,
                     std::vector<Lame<double>> const& materials) {
   ElasticModels::with(model, [&]<class Model>() {
-    static_assert(ProgramSolid<Model>::lanes == ProgramSolid<FixedCorotated>::lanes);
     if constexpr (std::same_as<Model, FixedCorotated>) {
       add_solid<Model>(terms, materials);
     } else {
@@ -33,8 +32,6 @@ std::span<std::string_view const> particle_models() {
       Arap::name,           Hencky::name,     hencky_plastic};
   return models;
 }
-
-int particle_lanes() { return ProgramSolid<FixedCorotated>::lanes; }
 
 bool yields_in_step(std::string_view model, FlowKind kind) {
   return model == hencky_plastic && (kind == FlowKind::von_mises || kind == FlowKind::sand);

@@ -37,7 +37,7 @@ std::span<OptionKey const> solver_keys() {
        {},
        {"auto", "always", "lagged", "rare"},
        "when the preconditioner is rebuilt: at each iterate; every refresh_every; the same and "
-       "where the steps collapse; auto: rare for schwarz, every 8 iterations for multigrid, always "
+       "where the steps collapse; auto: rare for schwarz and multigrid, always "
        "for the others"},
       {"refresh_every",
        30,

@@ -5,7 +5,6 @@ namespace {
 
 void add_hencky(ParticleTerms& terms, std::vector<HenckyParameters<double>> const& materials) {
   using Solid = ElasticParticles<Hencky, ParticleKernel, ParticlePrecision, DefaultSpace>;
-  static_assert(Solid::lanes == ProgramSolid<FixedCorotated>::lanes);
   terms.add(Solid(materials, terms.materials().end));
 }
 

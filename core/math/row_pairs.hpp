@@ -18,7 +18,7 @@ KOKKOS_FORCEINLINE_FUNCTION void load_row_pairs(ValueType<T> const* from, Index 
     if constexpr (lanes >= 8) {
       // The rows of every eighth lane in one register.
       auto const rows = [&](int lane) __attribute__((always_inline)) {
-        return Registers::template load_octets<2>(from, begin + lane);
+        return Registers::template load<8, 2>(from, begin + lane);
       };
       Vector low[4] = {rows(0), rows(1), rows(2), rows(3)},
              high[4] = {rows(4), rows(5), rows(6), rows(7)};

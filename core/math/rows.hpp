@@ -41,31 +41,17 @@ struct Quads {
     // Per quad: a0 a1 b0 b1, or a2 a3 b2 b3.
     return __builtin_shufflevector(a, b, (k / 4 * 4 + 2 * high + k % 2 + k % 4 / 2 * W)...);
   }
-  /// Quad j from from[scale begin[4 j]...].
-  template <int scale, class Index>
+  /// `row` numbers from from[scale begin[j row]...] after those of j - 1: whole rows of 4 or 8.
+  template <int row, int scale, class Index>
   static Vector load(Real const* from, Index const* begin) {
-    if constexpr (W == 4) {
+    if constexpr (W == row) {
       Vector v;
       std::memcpy(&v, from + scale * std::size_t(*begin), sizeof v);
       return v;
     } else {
       using Half = Quads<Real, W / 2>;
-      return concatenate(Half::template load<scale>(from, begin),
-                         Half::template load<scale>(from, begin + W / 2),
-                         std::make_integer_sequence<int, W>());
-    }
-  }
-  /// Octet j from from[scale begin[8 j]...].
-  template <int scale, class Index>
-  static Vector load_octets(Real const* from, Index const* begin) {
-    if constexpr (W == 8) {
-      Vector v;
-      std::memcpy(&v, from + scale * std::size_t(*begin), sizeof v);
-      return v;
-    } else {
-      using Half = Quads<Real, W / 2>;
-      return concatenate(Half::template load_octets<scale>(from, begin),
-                         Half::template load_octets<scale>(from, begin + W / 2),
+      return concatenate(Half::template load<row, scale>(from, begin),
+                         Half::template load<row, scale>(from, begin + W / 2),
                          std::make_integer_sequence<int, W>());
     }
   }
@@ -125,7 +111,7 @@ KOKKOS_FORCEINLINE_FUNCTION void load_rows(ValueType<T> const* from, Index const
     using Registers = kernels::QuadsOf<T>;
     typename Registers::Vector v[4];
     for (int i = 0; i < 4; ++i) {
-      v[i] = Registers::template load<scale>(from, begin + i);
+      v[i] = Registers::template load<4, scale>(from, begin + i);
     }
     Registers::transpose(v);
     for (int c = 0; c < 3; ++c) to[c] = std::bit_cast<T>(v[c]);

@@ -140,6 +140,19 @@ KOKKOS_FORCEINLINE_FUNCTION void store(T const& a, ValueType<T>* to) {
   }
 }
 
+/// The same, as numbers of another kind.
+template <class T, class To>
+KOKKOS_FORCEINLINE_FUNCTION void store_as(T const& a, To* to) {
+  if constexpr (std::is_same_v<ValueType<T>, To>) {
+    store(a, to);
+  } else {
+    constexpr int lanes = ScalarTraits<T>::lanes;
+    ValueType<T> value[lanes];
+    store(a, value);
+    for (int i = 0; i < lanes; ++i) to[i] = static_cast<To>(value[i]);
+  }
+}
+
 /// Collects lane i from `from[index[i]]`.
 template <class T, class Index>
 KOKKOS_FORCEINLINE_FUNCTION T gather(ValueType<T> const* from, Index const* index) {

@@ -71,7 +71,7 @@ struct GoldenStep {
         h(golden.at("dt")),
         gravity{golden.at("gravity")[0], golden.at("gravity")[1], golden.at("gravity")[2]},
         particles(golden_block(which)),
-        grid(dx, Solid::lanes),
+        grid(dx),
         scene(grid.unknowns(), Inertia<P, S>(grid.unknowns()),
               BodyForce<P, S>(grid.unknowns(), gravity),
               Solid({lame_parameters(1e5, 0.3), lame_parameters(1e9, 0.3)})) {

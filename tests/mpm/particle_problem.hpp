@@ -109,7 +109,7 @@ struct Problem {
   // Across leaves and the origin, with cells of several patches and blocks that are cut.
   explicit Problem(int team_size = 0, int cells = 4, int per_axis = 2)
       : list(jittered_block(cells, per_axis, dx, {-3.3, 5.2, 6.6}, 2)),
-        scene(list, dx, Term::lanes, 2),
+        scene(list, dx, 2),
         term(materials, 0, team_size),
         oracle{C::Kernel::width, dx, list, materials, scene.places(), {}},
         fixed("fixed", scene.nodes()) {

@@ -53,8 +53,7 @@ struct OnGrid {
   SparseGrid<Space> grid;
   Positions rest;
 
-  OnGrid(std::vector<Particle> const& list, double dx, int lanes, int materials = 1)
-      : particles(list), blocks(lanes) {
+  OnGrid(std::vector<Particle> const& list, double dx, int materials = 1) : particles(list) {
     blocks.sort(particles.x, particles.material, particles.count, materials, dx);
     grid.rebuild(blocks.cells(), blocks.cell_count(), K::width, dx);
     blocks.bind(grid.nodes());

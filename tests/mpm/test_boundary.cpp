@@ -66,7 +66,7 @@ TEST_CASE("the distance to a boundary grows by one along its normal", "[mpm][bou
 struct Run {
   double dx = 0.1;
   Particles<P, S> particles;
-  ParticleGrid<QuadraticSpline, P> grid{0.1, Solid::lanes};
+  ParticleGrid<QuadraticSpline, P> grid{0.1};
   Potential<Inertia<P>, BodyForce<P>, Solid, Slip<P>> scene;
   ParticleStepper<ImplicitEuler<Minimiser>> stepper;
   BoundaryList<S> boundaries;

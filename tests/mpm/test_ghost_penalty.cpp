@@ -411,7 +411,7 @@ Fall fall(double young, double strength, typename Minimiser::Params const& param
     list.push_back(p);
   }
   Particles<P, S> const particles(list);
-  ParticleGrid<K, P> grid(dx, Solid::lanes);
+  ParticleGrid<K, P> grid(dx);
   GhostPenalty<K, P> const ghosts({.strength = strength});
   Potential scene(grid.unknowns(), Inertia<P>(grid.unknowns()),
                   BodyForce<P>(grid.unknowns(), {0, -9.81, 0}),

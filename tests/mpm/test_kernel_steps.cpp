@@ -41,7 +41,7 @@ End drop(typename Minimiser::Params const& params) {
     p.stiffness = 1;
   }
   Particles<P, S> const particles(list);
-  ParticleGrid<K, P> grid(dx, Solid::lanes);
+  ParticleGrid<K, P> grid(dx);
   Potential scene(grid.unknowns(), Inertia<P>(grid.unknowns()),
                   BodyForce<P>(grid.unknowns(), {0, -9.81, 0}), Solid({lame_parameters(1e6, 0.3)}));
   BoundaryList<S> floor({{.name = "floor"}});

@@ -96,7 +96,7 @@ std::vector<Place> ring(double dx) {
 template <class Force>
 void move(std::vector<Particle>& list, double dx, double h, double end,
           std::vector<BoundarySpec> const& walls, Force const& force) {
-  ParticleGrid<QuadraticSpline, P> grid(dx, Solid::lanes);
+  ParticleGrid<QuadraticSpline, P> grid(dx);
   Potential scene(grid.unknowns(), Inertia<P>(grid.unknowns()),
                   BodyForce<P>(grid.unknowns(), {0, 0, 0}),
                   Solid({lame_parameters(young, poisson)}), Slip<P>());

@@ -31,7 +31,7 @@ TEST_CASE("one step of a block agrees with the reference", "[mpm][stepper]") {
     Vec3<double> const gravity{golden.at("gravity")[0], golden.at("gravity")[1],
                                golden.at("gravity")[2]};
     Particles<P, S> const particles(test::golden_block(which));
-    ParticleGrid<QuadraticSpline, P> grid(dx, Solid::lanes);
+    ParticleGrid<QuadraticSpline, P> grid(dx);
     Potential scene(grid.unknowns(), Inertia<P>(grid.unknowns()),
                     BodyForce<P>(grid.unknowns(), gravity),
                     Solid({lame_parameters(1e5, 0.3), lame_parameters(1e9, 0.3)}));

@@ -40,7 +40,7 @@ struct Run {
       Vec3<double> const& gravity = {0, 0, 0}, double tolerance = 1e-5)
       : dx(spacing),
         particles(list),
-        grid(spacing, Solid::lanes),
+        grid(spacing),
         scene(grid.unknowns(), Inertia<>(grid.unknowns()), BodyForce<>(grid.unknowns(), gravity),
               Solid(materials)),
         stepper(ImplicitEuler<Minimiser>({.stop = {.tolerance = tolerance}})) {}

@@ -41,7 +41,7 @@ struct Mixture {
 
   double dx = 0.05;
   std::vector<Particle> list = jittered_block(4, 2, dx, {-3.3, 5.2, 6.6}, 3);
-  OnGrid<QuadraticSpline, P, Space> scene{list, dx, Term<Soft>::lanes, 3};
+  OnGrid<QuadraticSpline, P, Space> scene{list, dx, 3};
   Term<Soft> soft;
   Term<Firm> firm;
   Oracle<Soft> of_soft;
@@ -221,7 +221,7 @@ std::vector<Particle> run(typename Minimiser::Params const& params, Terms const&
   std::vector<Particle> list = jittered_block(5, 2, 0.1, {-2.3, 0.2, 6.6}, 2, 0.05);
   for (Particle& one : list) one.v = {0, -1, 0};
   Particles<P> const particles(list);
-  ParticleGrid<QuadraticSpline, P> grid(0.1, BothTerms::lanes);
+  ParticleGrid<QuadraticSpline, P> grid(0.1);
   SceneOf<Terms...> scene(grid.unknowns(), Inertia<P>(grid.unknowns()),
                           BodyForce<P>(grid.unknowns(), {0, -9.81, 0}), terms...);
   ParticleStepper<ImplicitEuler<Minimiser>> stepper{ImplicitEuler<Minimiser>(params)};

@@ -26,7 +26,7 @@ struct Moving : test::OnGrid<K, P, S> {
   using Positions = typename Base::Positions;
   double dx;
   GridTransfer<K, P, S> transfer;
-  Moving(std::vector<Particle> const& list, double spacing) : Base(list, spacing, 4), dx(spacing) {
+  Moving(std::vector<Particle> const& list, double spacing) : Base(list, spacing), dx(spacing) {
     transfer.to_grid(this->particles, this->blocks, this->nodes(), dx);
   }
   /// The same velocities, changed by `kick(i)` at node i.
@@ -205,13 +205,13 @@ TEST_CASE("many particles in one cell, of many materials, are all counted", "[mp
     list[k].material = k % 5;
   }
   Particles<Fp64, S> const particles(list);
-  ParticleBlocks<QuadraticSpline, S> blocks(8);
+  ParticleBlocks<QuadraticSpline, S> blocks;
   blocks.sort(particles.x, particles.material, 1000, 5, 1.0);
   auto const& views = blocks.views();
   CHECK(views.patches == 5 * views.blocks);
   std::vector<int> seen(1000, 0);
   for (int patch = 0; patch < views.patches; ++patch) {
-    CHECK(views.slot_begin(patch) % 8 == 0);
+    CHECK(views.slot_begin(patch) % views.lanes == 0);
     for (int k = views.slot_begin(patch); k < views.slot_end(patch); ++k) {
       int const p = views.particle(k);
       CHECK((p >= 0) == (k < views.slot_begin(patch) + views.count(patch)));

@@ -165,7 +165,7 @@ Wrung wring(bool in_step, double h, double time, Visit const& visit) {
     p.plastic = 0;
   }
   Particles<Fp64, S> const particles(list);
-  ParticleGrid<QuadraticSpline, Fp64, S> grid(dx, Solid::lanes);
+  ParticleGrid<QuadraticSpline, Fp64, S> grid(dx);
   Potential scene(grid.unknowns(), Inertia<Fp64>(grid.unknowns()),
                   Solid({in_step ? hencky(lame, metal) : hencky(lame)}));
   Stepper stepper(ImplicitEuler<Minimiser>({.stop = {.tolerance = 1e-6}}), {}, {},
@@ -205,7 +205,7 @@ TEST_CASE("the pressure by which sand yields settles in few minimisations", "[mp
   }
   auto const stepped = [&](int passes) {
     Particles<Fp64, S> const particles(list);
-    ParticleGrid<QuadraticSpline, Fp64, S> grid(dx, Solid::lanes);
+    ParticleGrid<QuadraticSpline, Fp64, S> grid(dx);
     Potential scene(grid.unknowns(), Inertia<Fp64>(grid.unknowns()), Solid({hencky(lame, sand)}));
     Stepper stepper(ImplicitEuler<Minimiser>({.stop = {.tolerance = 1e-7}}, {passes}), {}, {},
                     FlowOfMaterials<S>({{.kind = FlowKind::sand, .sand = sand}}));
