@@ -17,6 +17,21 @@ namespace taut::kernels {
 /// Numbers that sweeps read for each particle.
 inline constexpr int point_numbers = 13;  ///< t (3), F^n (9), weight (1)
 
+/// x - X: how far a node has gone.
+template <class S, class Position>
+struct Displacement {
+  VectorField<Position, S> x, rest;
+  KOKKOS_FORCEINLINE_FUNCTION Position operator()(int node, int c) const {
+    return x(node, c) - rest(node, c);
+  }
+};
+/// A field as it is.
+template <class S, class Position>
+struct NodeField {
+  VectorField<Position, S> v;
+  KOKKOS_FORCEINLINE_FUNCTION Position operator()(int node, int c) const { return v(node, c); }
+};
+
 /// `packed`: one thread per patch, which computes packs; otherwise threads with a particle each.
 template <class S, class Real, Spline K, bool packed>
 struct BlockSweep {
@@ -81,10 +96,16 @@ struct BlockSweep {
   template <class Team, class Field>
   KOKKOS_FORCEINLINE_FUNCTION void load_relative(Team const& team, int patch, Field const& field,
                                                  Local const& to) const {
-    int const* const node = blocks.nodes_of(patch);
-    int const first = node[first_node(patch)];
+    int const first = blocks.nodes_of(patch)[first_node(patch)];
     std::decay_t<decltype(field(0, 0))> origin[3];
     for (int c = 0; c < 3; ++c) origin[c] = field(first, c);
+    load_from(team, patch, field, origin, to);
+  }
+  /// The same, less `origin`.
+  template <class Team, class Field, class Origin>
+  KOKKOS_FORCEINLINE_FUNCTION void load_from(Team const& team, int patch, Field const& field,
+                                             Origin const (&origin)[3], Local const& to) const {
+    int const* const node = blocks.nodes_of(patch);
     Real* const row = to.data();
     auto const body = [&](int l) __attribute__((always_inline)) {
       int const n = node[l];
@@ -137,7 +158,17 @@ struct BlockSweep {
   KOKKOS_FORCEINLINE_FUNCTION static Mat3<Value> gradient(Weights<K, Value> const& at,
                                                           std::uint16_t const* corner,
                                                           Real const* field) {
+    Value value[3];
+    return sums(at.w, at.d, corner, field, value);
+  }
+  /// value = Sum_i g_i w_i, and Sum_i g_i (s_i)^T, where s_i has along each axis the numbers `d` in
+  /// the place of the weights.
+  KOKKOS_FORCEINLINE_FUNCTION static Mat3<Value> sums(Value const (&w)[3][K::width],
+                                                      Value const (&d)[3][K::width],
+                                                      std::uint16_t const* corner,
+                                                      Real const* field, Value (&value)[3]) {
     Value const zero(0);
+    for (int k = 0; k < 3; ++k) value[k] = zero;
     Value sum[3][3] = {{zero, zero, zero}, {zero, zero, zero}, {zero, zero, zero}};  // [axis]
     for (int a = 0; a < K::width; ++a) {
       Value plane[3] = {zero, zero, zero}, plane_y[3] = {zero, zero, zero},
@@ -148,20 +179,21 @@ struct BlockSweep {
           Value g[3];
           load_rows(field + 4 * Views::local(a, b, c), corner, g);
           for (int k = 0; k < 3; ++k) {
-            line[k] = line[k] + at.w[2][c] * g[k];
-            line_z[k] = line_z[k] + at.d[2][c] * g[k];
+            line[k] = line[k] + w[2][c] * g[k];
+            line_z[k] = line_z[k] + d[2][c] * g[k];
           }
         }
         for (int k = 0; k < 3; ++k) {
-          plane[k] = plane[k] + at.w[1][b] * line[k];
-          plane_y[k] = plane_y[k] + at.d[1][b] * line[k];
-          plane_z[k] = plane_z[k] + at.w[1][b] * line_z[k];
+          plane[k] = plane[k] + w[1][b] * line[k];
+          plane_y[k] = plane_y[k] + d[1][b] * line[k];
+          plane_z[k] = plane_z[k] + w[1][b] * line_z[k];
         }
       }
       for (int k = 0; k < 3; ++k) {
-        sum[0][k] = sum[0][k] + at.d[0][a] * plane[k];
-        sum[1][k] = sum[1][k] + at.w[0][a] * plane_y[k];
-        sum[2][k] = sum[2][k] + at.w[0][a] * plane_z[k];
+        value[k] = value[k] + w[0][a] * plane[k];
+        sum[0][k] = sum[0][k] + d[0][a] * plane[k];
+        sum[1][k] = sum[1][k] + w[0][a] * plane_y[k];
+        sum[2][k] = sum[2][k] + w[0][a] * plane_z[k];
       }
     }
     return {{sum[0][0], sum[0][1], sum[0][2], sum[1][0], sum[1][1], sum[1][2], sum[2][0], sum[2][1],

@@ -16,15 +16,6 @@
 
 namespace taut::kernels {
 
-/// x - X: how far a node has gone.
-template <class S, class Position>
-struct Displacement {
-  VectorField<Position, S> x, rest;
-  KOKKOS_FORCEINLINE_FUNCTION Position operator()(int node, int c) const {
-    return x(node, c) - rest(node, c);
-  }
-};
-
 /// What all elastic sweeps over particles read.
 template <class S, class Precision, class Material, Spline K, bool packed>
 struct ParticleSweep : BlockSweep<S, typename Precision::real, K, packed> {

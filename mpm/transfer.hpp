@@ -89,11 +89,23 @@ struct PlaceInCell {
   }
 };
 
+/// What a particle is to a sweep, one of them or a pack: numbers that lie apart, side by side.
+template <class T, int numbers>
+struct Collected {
+  static constexpr int width = ScalarTraits<T>::lanes;
+  ValueType<T> number[numbers][width];
+  KOKKOS_FORCEINLINE_FUNCTION T operator[](int k) const { return load<T>(number[k]); }
+  KOKKOS_FORCEINLINE_FUNCTION Vec3<T> vector(int k) const {
+    return {(*this)[k], (*this)[k + 1], (*this)[k + 2]};
+  }
+};
+
 /// Leaves mass and momentum of each patch in rows of four.
-template <class S, class Precision, Spline K>
-struct ToGrid : BlockSweep<S, typename Precision::position, K, false> {
+template <class S, class Precision, Spline K, bool packed = S::on_host>
+struct ToGrid : BlockSweep<S, typename Precision::position, K, packed> {
   using Scalar = typename Precision::position;
-  using Base = BlockSweep<S, Scalar, K, false>;
+  using Base = BlockSweep<S, Scalar, K, packed>;
+  using T = typename Base::Value;
   using Local = typename Base::Local;
 
   PlaceInCell<S, Precision, K> place;
@@ -106,31 +118,48 @@ struct ToGrid : BlockSweep<S, typename Precision::position, K, false> {
     Local const rows(team.team_scratch(0), 4 * Base::nodes);
     this->clear(team, rows, 4);
     team.team_barrier();
-    auto const& particles = place.particles;
-    double const dx = place.dx;
-    auto const body = [&](int g, bool active) {
-      int const p = this->blocks.particle(slots + g);
-      if (p < 0) return;  // padding, met by a thread that is alone
-      Vec3<double> const t = place(p);
-      Weights<K, double> const at(t);
-      Mat3<double> const C = matrix_at(particles.C, p);
-      double const m = double(particles.mass(p));
-      Vec3<double> v = C * place.to_base(t);
-      for (int c = 0; c < 3; ++c) v[c] += double(particles.v(p, c));
-      auto const received = [&](int a, int b, int c, Scalar(&row)[4]) {
-        double const w = m * at.weight(a, b, c);
-        row[0] = static_cast<Scalar>(w);
+    T const dx = T(static_cast<Scalar>(place.dx));
+    auto const body = [&](int g, bool active) __attribute__((always_inline)) {
+      Collected<T, 16> const own = collect(slots + g * Base::width);
+      Weights<K, T> const at(own.vector(0));
+      Vec3<T> const v = own.vector(3);
+      T const m = own[15];
+      auto const received = [&](int a, int b, int c, T(&row)[4]) __attribute__((always_inline)) {
+        T const w = m * at.weight(a, b, c);
+        row[0] = w;
         for (int k = 0; k < 3; ++k) {
-          row[1 + k] =
-              static_cast<Scalar>(w * (v[k] + dx * (a * C(k, 0) + b * C(k, 1) + c * C(k, 2))));
+          T const turned =
+              T(Scalar(a)) * own[6 + k] + T(Scalar(b)) * own[9 + k] + T(Scalar(c)) * own[12 + k];
+          row[1 + k] = w * (v[k] + dx * turned);
         }
       };
-      this->template give<4>(team, active, this->blocks.corner.data() + slots + g, rows.data(),
-                             received);
+      this->template give<4>(team, active, this->blocks.corner.data() + slots + g * Base::width,
+                             rows.data(), received);
     };
     this->in_rounds(team, patch, body);
     team.team_barrier();
     this->template take<4>(team, patch, rows, partial);
+  }
+
+private:
+  /// t, the velocity at the lowest node, C by columns, mass. What fills a pack up has none.
+  KOKKOS_FORCEINLINE_FUNCTION Collected<T, 16> collect(int slot) const {
+    auto const& particles = place.particles;
+    Collected<T, 16> to;
+    for (int l = 0; l < Base::width; ++l) {
+      int const p = this->blocks.like(slot + l);
+      Vec3<double> const t = place(p);
+      Mat3<double> const C = matrix_at(particles.C, p);
+      Vec3<double> const v = C * place.to_base(t);
+      for (int c = 0; c < 3; ++c) {
+        to.number[c][l] = static_cast<Scalar>(t[c]);
+        to.number[3 + c][l] = static_cast<Scalar>(v[c] + double(particles.v(p, c)));
+      }
+      for (int k = 0; k < 9; ++k) to.number[6 + k][l] = static_cast<Scalar>(C.a[k]);
+      bool const is = this->blocks.particle(slot + l) >= 0;
+      to.number[15][l] = is ? static_cast<Scalar>(particles.mass(p)) : Scalar(0);
+    }
+    return to;
   }
 };
 
@@ -171,42 +200,26 @@ struct MomentumToVelocity {
   }
 };
 
-/// What a particle sees of the displacement of the nodes.
+/// The farthest that a particle of a patch goes, m.
 template <class S, class Precision, Spline K>
-struct SeenByParticle {
+struct ParticleTravel {
   using Scalar = typename Precision::position;
   BlockViews<K, S> blocks;
   PlaceInCell<S, Precision, K> place;
   VectorField<Scalar, S> x, rest;  ///< of the nodes
-
-  /// Calls visit(node, u, a, b, c, weights) for the nodes of a slot.
-  template <class Visit>
-  KOKKOS_FORCEINLINE_FUNCTION void for_each_node(int const* node, Visit const& visit) const {
-    for (int a = 0; a < K::width; ++a)
-      for (int b = 0; b < K::width; ++b)
-        for (int c = 0; c < K::width; ++c) {
-          int const n = node[BlockViews<K, S>::local(a, b, c)];
-          Vec3<double> u;
-          for (int k = 0; k < 3; ++k) u[k] = double(x(n, k)) - double(rest(n, k));
-          visit(n, u, a, b, c);
-        }
-  }
-};
-
-/// The farthest that a particle of a patch goes, m.
-template <class S, class Precision, Spline K>
-struct ParticleTravel {
-  SeenByParticle<S, Precision, K> seen;
   KOKKOS_FUNCTION void operator()(int patch, double& farthest) const {
-    auto const& blocks = seen.blocks;
     int const slots = blocks.slot_begin(patch);
-    for (int k = slots; k < slots + blocks.count(patch); ++k) {
-      Weights<K, double> const at(seen.place(blocks.particle(k)));
+    for (int slot = slots; slot < slots + blocks.count(patch); ++slot) {
+      Weights<K, double> const at(place(blocks.particle(slot)));
+      int const* const node = blocks.nodes_of(patch) + blocks.corner(slot) / 4;
       Vec3<double> move{};
-      seen.for_each_node(blocks.nodes_of(patch) + blocks.corner(k) / 4,
-                         [&](int, Vec3<double> const& u, int a, int b, int c) {
-                           move = move + at.weight(a, b, c) * u;
-                         });
+      for (int a = 0; a < K::width; ++a)
+        for (int b = 0; b < K::width; ++b)
+          for (int c = 0; c < K::width; ++c) {
+            int const n = node[BlockViews<K, S>::local(a, b, c)];
+            double const w = at.weight(a, b, c);
+            for (int k = 0; k < 3; ++k) move[k] += w * (double(x(n, k)) - double(rest(n, k)));
+          }
       farthest = Kokkos::max(farthest, norm(move));
     }
   }
@@ -223,45 +236,109 @@ struct NodeTravel {
 };
 
 /// Moves the particles of a patch to the end of the step.
-template <class S, class Precision, Spline K, class Transfer_, class Flow_>
-struct ToParticles {
+template <class S, class Precision, Spline K, class Transfer_, class Flow_,
+          bool packed = S::on_host>
+struct ToParticles : BlockSweep<S, typename Precision::position, K, packed> {
   using Scalar = typename Precision::position;
-  SeenByParticle<S, Precision, K> seen;
-  VectorField<Scalar, S> v, v_before;  ///< of the nodes, at the end of the step and before it
+  using Base = BlockSweep<S, Scalar, K, packed>;
+  using T = typename Base::Value;
+  using Local = typename Base::Local;
+
+  PlaceInCell<S, Precision, K> place;
+  Displacement<S, Scalar> displacement;  ///< of the nodes
+  NodeField<S, Scalar> v, v_before;      ///< of the nodes, at the end of the step and before it
   double h;
   Transfer_ transfer;
   Flow_ flow;
 
-  KOKKOS_FUNCTION void move(int p, int const* node) const {
-    auto const& particles = seen.place.particles;
-    double const dx = seen.place.dx;
-    Vec3<double> const t = seen.place(p), to_base = seen.place.to_base(t);
-    Weights<K, double> const at(t);
-    Vec3<double> pic{}, gained{}, travel{};
-    Mat3<double> B = 0.0 * identity3<double>(), G = B;
-    seen.for_each_node(node, [&](int n, Vec3<double> const& u, int a, int b, int c) {
-      double const w = at.weight(a, b, c);
-      Vec3<double> const grad = at.gradient(a, b, c);
-      Vec3<double> const d{to_base[0] + a * dx, to_base[1] + b * dx, to_base[2] + c * dx};
-      Vec3<double> wv;
+  std::size_t scratch_bytes() const { return 3 * Base::row_bytes(3); }
+
+  KOKKOS_FUNCTION void operator()(typename S::team_member const& team) const {
+    int const patch = team.league_rank();
+    Local const u(team.team_scratch(0), 4 * Base::nodes);
+    Local const after(team.team_scratch(0), 4 * Base::nodes);
+    Local const before(team.team_scratch(0), 4 * Base::nodes);
+    Scalar const origin[3] = {0, 0, 0};
+    this->load_from(team, patch, displacement, origin, u);
+    this->load_from(team, patch, v, origin, after);
+    if (transfer.flip != 0) this->load_from(team, patch, v_before, origin, before);
+    team.team_barrier();
+    int const slots = this->blocks.slot_begin(patch);
+    auto const body = [&](int g) __attribute__((always_inline)) {
+      move(slots + g * Base::width, u.data(), after.data(), before.data());
+    };
+    Kokkos::parallel_for(Kokkos::TeamThreadRange(team, this->groups(patch)), body);
+  }
+
+private:
+  /// What the nodes make of a particle.
+  struct Seen {
+    Vec3<double> v, before, travel;
+    Mat3<double> B,
+        G;  ///< Sum w v a^T with a the place in the stencil, and Sum u grad w^T per cell
+  };
+
+  KOKKOS_FORCEINLINE_FUNCTION void move(int slot, Scalar const* u, Scalar const* after,
+                                        Scalar const* before) const {
+    Collected<T, 3> t;
+    for (int l = 0; l < Base::width; ++l) {
+      Vec3<double> const own = place(this->blocks.like(slot + l));
+      for (int c = 0; c < 3; ++c) t.number[c][l] = static_cast<Scalar>(own[c]);
+    }
+    Weights<K, T> const at(t.vector(0));
+    T first[3][K::width];  // weights times places
+    for (int c = 0; c < 3; ++c)
+      for (int a = 0; a < K::width; ++a) first[c][a] = T(Scalar(a)) * at.w[c][a];
+    std::uint16_t const* const corner = this->blocks.corner.data() + slot;
+    T value[3];
+    Collected<T, 27> sum;
+    auto const keep = [&](int to, T const* from, int count) __attribute__((always_inline)) {
+      for (int k = 0; k < count; ++k) store(from[k], sum.number[to + k]);
+    };
+    Mat3<T> const G = Base::sums(at.w, at.d, corner, u, value);
+    keep(0, value, 3);
+    keep(3, G.a, 9);
+    Mat3<T> const B = Base::sums(at.w, first, corner, after, value);
+    keep(12, value, 3);
+    keep(15, B.a, 9);
+    if (transfer.flip != 0) {
+      Base::sums(at.w, at.d, corner, before, value);
+      keep(24, value, 3);
+    }
+    for (int l = 0; l < Base::width; ++l) {
+      int const p = this->blocks.particle(slot + l);
+      if (p < 0) continue;
+      Seen seen{};
+      auto const number = [&](int k) { return double(sum.number[k][l]); };
       for (int k = 0; k < 3; ++k) {
-        wv[k] = w * double(v(n, k));
-        if (transfer.flip != 0) gained[k] += wv[k] - w * double(v_before(n, k));
+        seen.travel[k] = number(k);
+        seen.v[k] = number(12 + k);
+        if (transfer.flip != 0) seen.before[k] = number(24 + k);
       }
-      pic = pic + wv;
-      travel = travel + w * u;
-      if constexpr (K::inertia > 0) B = B + outer(wv, d);
-      G = G + outer(u, grad);
-    });
-    G = (1 / dx) * G;
-    double const flip = transfer.flip;
-    Mat3<double> C = K::inertia > 0 ? (1 / (K::inertia * dx * dx)) * B : (1 / h) * G;
+      for (int k = 0; k < 9; ++k) {
+        seen.G.a[k] = number(3 + k);
+        seen.B.a[k] = number(15 + k);
+      }
+      finish(p, {double(t.number[0][l]), double(t.number[1][l]), double(t.number[2][l])}, seen);
+    }
+  }
+
+  KOKKOS_FUNCTION void finish(int p, Vec3<double> const& t, Seen const& seen) const {
+    auto const& particles = place.particles;
+    double const dx = place.dx;
+    Mat3<double> const G = (1 / dx) * seen.G;
+    Mat3<double> C = (1 / h) * G;
+    if constexpr (K::inertia > 0) {
+      // x_i - x_p = dx a + (from the particle to the lowest node)
+      C = (1 / (K::inertia * dx * dx)) * (dx * seen.B + outer(seen.v, place.to_base(t)));
+    }
     set_matrix(particles.C, p, transfer.affine(C));
+    double const flip = transfer.flip;
     for (int k = 0; k < 3; ++k) {
-      double const new_v =
-          flip != 0 ? (1 - flip) * pic[k] + flip * (double(particles.v(p, k)) + gained[k]) : pic[k];
+      double const flipped = double(particles.v(p, k)) + seen.v[k] - seen.before[k];
+      double const new_v = flip != 0 ? (1 - flip) * seen.v[k] + flip * flipped : seen.v[k];
       particles.v(p, k) = static_cast<Scalar>(new_v);
-      particles.x(p, k) = static_cast<Scalar>(double(particles.x(p, k)) + travel[k]);
+      particles.x(p, k) = static_cast<Scalar>(double(particles.x(p, k)) + seen.travel[k]);
     }
     Mat3<double> const before = matrix_at(particles.F, p);
     Mat3<double> F = before + G * before;
@@ -270,13 +347,6 @@ struct ToParticles {
     particles.plastic(p) = static_cast<Scalar>(plastic);
     particles.stiffness(p) = static_cast<Scalar>(stiffness);
     set_matrix(particles.F, p, F);
-  }
-  KOKKOS_FUNCTION void operator()(int patch) const {
-    auto const& blocks = seen.blocks;
-    int const slots = blocks.slot_begin(patch);
-    for (int k = slots; k < slots + blocks.count(patch); ++k) {
-      move(blocks.particle(k), blocks.nodes_of(patch) + blocks.corner(k) / 4);
-    }
   }
 };
 
@@ -337,7 +407,7 @@ double farthest_travel(Particles<Precision, Space> const& particles,
                        Positions const& rest, double dx) {
   return maximum<Space>(
       "particle_travel", blocks.views().patches, 0.0,
-      kernels::ParticleTravel<Space, Precision, K>{{blocks.views(), {particles, dx}, x, rest}});
+      kernels::ParticleTravel<Space, Precision, K>{blocks.views(), {particles, dx}, x, rest});
 }
 
 /// Moves particles by a step of h seconds in which the nodes went from `rest` to x and their
@@ -347,9 +417,10 @@ void to_particles(Particles<Precision, Space> const& particles,
                   ParticleBlocks<K, Space> const& blocks, Positions const& x, Positions const& rest,
                   Positions const& v, Positions const& v_before, double h, double dx,
                   T const& transfer, F const& flow) {
-  for_each<Space>("to_particles", blocks.views().patches,
-                  kernels::ToParticles<Space, Precision, K, T, F>{
-                      {blocks.views(), {particles, dx}, x, rest}, v, v_before, h, transfer, flow});
+  kernels::ToParticles<Space, Precision, K, T, F> const kernel{
+      {blocks.views()}, {particles, dx}, {x, rest}, {v}, {v_before}, h, transfer, flow};
+  for_each_team<Space>("to_particles", blocks.views().patches, Space::on_host ? 1 : 64,
+                       kernel.scratch_bytes(), kernel);
 }
 
 }  // namespace taut
