@@ -39,9 +39,8 @@ struct BlockSweep {
   using Value = std::conditional_t<packed, HostPack<Real>, Real>;
   using Local = ScratchField<S, Real>;
   static constexpr int width = ScalarTraits<Value>::lanes;
-  /// Particles side by side in memory: a register on the host, a warp on a device.
-  static constexpr int lanes = S::on_host ? host_lanes<Real> : 32;
-  static constexpr int per_pack = lanes / width;
+  using Layout = SlotLayout<S, Real, point_numbers>;
+  static constexpr int lanes = Layout::lanes;
   static constexpr int nodes = Views::nodes, side = Views::side;
 
   Views blocks;
@@ -54,7 +53,7 @@ struct BlockSweep {
     return Local::shmem_size(std::size_t(padded(numbers)) * nodes);
   }
 
-  /// What sweeps read of the particles of a patch: [pack][number][lane].
+  /// What sweeps read of the particles of a patch.
   struct Points {
     std::uint16_t const* corner;
     Real const* data;
@@ -63,7 +62,7 @@ struct BlockSweep {
       return corner + g * width;
     }
     KOKKOS_FORCEINLINE_FUNCTION Value number(int g, int k) const {
-      return load<Value>(data + (g / per_pack * point_numbers + k) * lanes + g % per_pack * width);
+      return load<Value>(data + Layout::place(g * width, k));
     }
     KOKKOS_FORCEINLINE_FUNCTION Weights<K, Value> weights(int g) const {
       return Weights<K, Value>({number(g, 0), number(g, 1), number(g, 2)});
@@ -78,27 +77,22 @@ struct BlockSweep {
   };
   KOKKOS_FORCEINLINE_FUNCTION Points points(int patch, Real const* data) const {
     int const begin = blocks.slot_begin(patch);
-    return {blocks.corner.data() + begin, data + std::size_t(point_numbers) * begin};
+    return {blocks.corner.data() + begin, data + Layout::place(begin)};
   }
   /// Groups of `width` particles, padding included.
   KOKKOS_FORCEINLINE_FUNCTION int groups(int patch) const {
     return (blocks.slot_end(patch) - blocks.slot_begin(patch)) / width;
   }
-  /// A local node of the patch that certainly is a node of the grid, and of which its first
-  /// particle sees much: nodes that hardly any particle sees may be far off.
-  KOKKOS_FORCEINLINE_FUNCTION int first_node(int patch) const {
-    constexpr int middle = K::width / 2;
-    return blocks.corner(blocks.slot_begin(patch)) / 4 + Views::local(middle, middle, middle);
-  }
 
-  /// Copies what `field(node, c)` says of the nodes of the patch, less that of one of them, into
-  /// rows of four; zero where the grid has no node.
+  /// Copies what `field(node, c)` says of the nodes of the patch, less that of its heart, into rows
+  /// of four; zero where the grid has no node. Less that of a node that hardly any particle sees,
+  /// which may be far off, the others would lose digits.
   template <class Team, class Field>
   KOKKOS_FORCEINLINE_FUNCTION void load_relative(Team const& team, int patch, Field const& field,
                                                  Local const& to) const {
-    int const first = blocks.nodes_of(patch)[first_node(patch)];
+    int const heart = blocks.nodes_of(patch)[blocks.heart(patch)];
     std::decay_t<decltype(field(0, 0))> origin[3];
-    for (int c = 0; c < 3; ++c) origin[c] = field(first, c);
+    for (int c = 0; c < 3; ++c) origin[c] = field(heart, c);
     load_from(team, patch, field, origin, to);
   }
   /// The same, less `origin`.

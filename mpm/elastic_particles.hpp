@@ -35,19 +35,16 @@ struct PreparePoints {
   Kokkos::View<Real*, typename S::memory> data;
 
   KOKKOS_FUNCTION void operator()(int slot) const {
-    constexpr int lanes = BlockSweep<S, Real, K, false>::lanes;
     int const p = blocks.particle(slot), like = blocks.like(slot);
-    Real* const to = data.data() + std::size_t(slot / lanes) * point_numbers * lanes + slot % lanes;
+    auto const set = [&](int k, double value) {
+      data(SlotLayout<S, Real, point_numbers>::place(slot, k)) = static_cast<Real>(value);
+    };
     for (int c = 0; c < 3; ++c) {
       double const x = double(particles.x(like, c)) * per_dx;
-      to[c * lanes] = static_cast<Real>((x - base_node<K>(x)) - K::start);
+      set(c, (x - base_node<K>(x)) - K::start);
     }
-    for (int k = 0; k < 9; ++k) {
-      to[(3 + k) * lanes] = static_cast<Real>(particles.F(like, k));
-    }
-    to[12 * lanes] =
-        p >= 0 ? static_cast<Real>(double(particles.volume(p)) * double(particles.stiffness(p)))
-               : Real(0);
+    for (int k = 0; k < 9; ++k) set(3 + k, double(particles.F(like, k)));
+    set(12, p >= 0 ? double(particles.volume(p)) * double(particles.stiffness(p)) : 0);
   }
 };
 
@@ -145,8 +142,7 @@ public:
     grow(bounds_, "particle_bounds", blocks_.patches);
     if constexpr (RememberingMaterial<Material>) {
       grow(memory_.data, "particle_memory", std::size_t(memory_.numbers) * blocks_.slots);
-      constexpr int lanes = kernels::BlockSweep<Space, Real, K, packed_>::lanes;
-      using Kernel_ = kernels::Remember<Space, Precision, Material, K, lanes>;
+      using Kernel_ = kernels::Remember<Space, Precision, Material, K>;
       for_each<Space>("remember", blocks_.patches,
                       Kernel_{blocks_, particles, materials_, memory_});
       if (lags_) lag_reducer_.provide(blocks_.patches, 2);

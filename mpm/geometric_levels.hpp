@@ -52,18 +52,15 @@ struct NumbersOfLevel {
   Kokkos::View<Real*, typename S::memory> to;
 
   KOKKOS_FUNCTION void operator()(int slot) const {
-    int const p = blocks.particle(slot);
+    using Layout = OperatorLayout<S, Real>;
+    int const p = blocks.particle(slot), like = blocks.like(slot);
     for (int c = 0; c < 3; ++c) {
-      double const at = p >= 0 ? double(x(p, c)) * per_dx : K::start + 0.5;
-      to(place(slot, c)) = Real((at - base_node<K>(at)) - K::start);
+      double const at = double(x(like, c)) * per_dx;
+      to(Layout::place(slot, c)) = Real((at - base_node<K>(at)) - K::start);
     }
     for (int k = 3; k < operator_numbers; ++k) {
-      to(place(slot, k)) = p >= 0 ? factor * fine(place(fine_slot(p), k)) : Real(0);
+      to(Layout::place(slot, k)) = p >= 0 ? factor * fine(Layout::place(fine_slot(p), k)) : Real(0);
     }
-  }
-  KOKKOS_FORCEINLINE_FUNCTION static std::size_t place(int slot, int k) {
-    constexpr int lanes = BlockSweep<S, Real, K, false>::lanes;
-    return (std::size_t(slot / lanes) * operator_numbers + k) * lanes + slot % lanes;
   }
 };
 

@@ -57,7 +57,6 @@ struct AssembleCells {
   }
   static constexpr int most = along * along * along, padded = whole(most);
   static constexpr int chunk = 8;  ///< particles at a time
-  static constexpr int lanes = BlockSweep<S, T, K, false>::lanes;
   static_assert(along - 1 <= R);
   using Row = StencilRow<R>;
 
@@ -96,7 +95,7 @@ struct AssembleCells {
 
 private:
   KOKKOS_FORCEINLINE_FUNCTION T number(int slot, int k) const {
-    return data((std::size_t(slot / lanes) * operator_numbers + k) * lanes + slot % lanes);
+    return data(OperatorLayout<S, T>::place(slot, k));
   }
 
   /// Of every cell the particles of `chunk` rounds, then of the next.

@@ -53,7 +53,10 @@ struct BlockViews {
   List<int> round_end;         ///< at slot_begin(patch) + r: where round r ends in the patch
   List<int> material;          ///< per patch
   List<int> block;             ///< per patch
-  List<int> patch_begin;       ///< per block, +1
+  /// Per patch: the local node in the middle of what the fullest cell sees, so of what many
+  /// particles see much. It certainly is a node of the grid.
+  List<int> heart;
+  List<int> patch_begin;  ///< per block, +1
   Kokkos::View<int* [3], typename S::layout, typename S::memory>
       origin;                ///< per block: its lowest node
   List<int> node;            ///< per block and local node: number in the grid, or -1
@@ -68,6 +71,19 @@ struct BlockViews {
   }
   KOKKOS_FORCEINLINE_FUNCTION int const* nodes_of(int patch) const {
     return node.data() + std::size_t(nodes) * block(patch);
+  }
+};
+
+/// How so many numbers of each particle lie in memory: [pack][number][lane], so that sweeps read a
+/// pack of particles at a time.
+template <class S, class T, int numbers>
+struct SlotLayout {
+  /// Particles side by side: a register on the host, a warp on a device.
+  static constexpr int lanes = S::on_host ? host_lanes<T> : 32;
+
+  /// Where number k of the particle in a slot is.
+  KOKKOS_FORCEINLINE_FUNCTION static std::size_t place(int slot, int k = 0) {
+    return (std::size_t(slot / lanes) * numbers + k) * lanes + slot % lanes;
   }
 };
 
@@ -220,7 +236,7 @@ struct FillPatch {
   BlockViews<K, S> to;
 
   KOKKOS_FUNCTION void operator()(int patch) const {
-    constexpr int cells = 64;
+    constexpr int cells = 64, middle = K::width / 2;
     int begin[cells], end[cells];
     for (int c = 0; c < cells; ++c) begin[c] = end[c] = 0;
     int const first = counts.first(patch), count = counts.count(patch);
@@ -229,14 +245,18 @@ struct FillPatch {
       if (end[c] == 0) begin[c] = k;
       end[c] = k + 1;
     }
+    int fullest = 0;
+    for (int c = 1; c < cells; ++c) {
+      if (end[c] - begin[c] > end[fullest] - begin[fullest]) fullest = c;
+    }
+    to.heart(patch) = local(fullest) + BlockViews<K, S>::local(middle, middle, middle);
     int const slots = to.slot_begin(patch);
     int slot = 0;
     for (int round = 0; slot < count; ++round) {
       for (int c = 0; c < cells; ++c) {
         if (begin[c] + round >= end[c]) continue;
         to.particle(slots + slot) = order(begin[c] + round);
-        to.corner(slots + slot) =
-            static_cast<std::uint16_t>(4 * BlockViews<K, S>::local(c >> 4, c >> 2 & 3, c & 3));
+        to.corner(slots + slot) = static_cast<std::uint16_t>(4 * local(c));
         ++slot;
       }
       to.round_end(slots + round) = slot;
@@ -246,6 +266,12 @@ struct FillPatch {
       to.particle(slots + k) = -1;
       to.corner(slots + k) = to.corner(slots + k / counts.lanes * counts.lanes);
     }
+  }
+
+private:
+  /// The lowest local node that a cell of the block sees.
+  KOKKOS_FORCEINLINE_FUNCTION static int local(int cell) {
+    return BlockViews<K, S>::local(cell >> 4, cell >> 2 & 3, cell & 3);
   }
 };
 
@@ -377,6 +403,7 @@ void ParticleBlocks<K, S>::sort(Positions const& x, List<int const> const& mater
   grow(first_, "patch_first", patches);
   grow(views_.material, "patch_material", patches);
   grow(views_.block, "patch_block", patches);
+  grow(views_.heart, "patch_heart", patches);
   grow(views_.count, "patch_count", patches);
   grow(views_.slot_begin, "slot_begin", patches + 1);
   grow(views_.patch_begin, "patch_begin", blocks + 1);

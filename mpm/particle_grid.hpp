@@ -105,8 +105,10 @@ public:
   SparseGrid<Space> const& sparse() const { return grid_; }
   GridNodes<Space> const& nodes() const { return grid_.nodes(); }
   int size() const { return unknowns_.size(); }
-  Positions const& rest() const { return rest_; }          ///< places of the nodes, m
-  Positions const& velocity() const { return velocity_; }  ///< where the step begins, m/s
+  Positions const& rest() const { return rest_; }  ///< places of the nodes, m
+  Positions const& velocity() const {
+    return transfer_.velocity();
+  }  ///< where the step begins, m/s
 
   /// Makes the grid around particles of `materials` materials, and brings their mass and momentum
   /// to it. Throws Error for a particle of which something is not a number, or that is out of
@@ -125,7 +127,6 @@ public:
     transfer_.to_grid(particles, blocks_, n, dx_);
     rest_ = memory_[0].resize("node_rest", n);
     unknowns_.prescribed = memory_[1].resize("node_prescribed", n);
-    velocity_ = transfer_.velocity();
     unknowns_.mass = mass_memory_.resize("node_mass", n);
     unknowns_.fixed = fixed_memory_.resize("node_fixed", n);
     for_each<Space>("node_places", n,
@@ -141,13 +142,21 @@ public:
                                                      rest_, unknowns_.prescribed, unknowns_.fixed});
   }
 
+  /// Moves particles by a step of h seconds in which the nodes went to x, with the velocities v at
+  /// its end.
+  template <Transfer T, Flow F>
+  void to_particles(Particles<Precision, Space> const& particles, Positions const& x,
+                    Positions const& v, double h, T const& transfer, F const& flow) const {
+    transfer_.to_particles(particles, blocks_, x, rest_, v, h, dx_, transfer, flow);
+  }
+
 private:
   double dx_;
   Blocks blocks_;
   SparseGrid<Space> grid_;
   GridTransfer<K, Precision, Space> transfer_;
   Unknowns<Precision, Space> unknowns_;
-  Positions rest_, velocity_;
+  Positions rest_;
   Resizable<Positions> memory_[2];
   Resizable<Array<typename Precision::real, Space>> mass_memory_;
   Resizable<FixedMask<Space>> fixed_memory_;

@@ -37,7 +37,7 @@ struct ParticleSweep : BlockSweep<S, typename Precision::real, K, packed> {
   KOKKOS_FORCEINLINE_FUNCTION Parameters own(Parameters const& of_patch, int patch, int g) const {
     if constexpr (RememberingMaterial<Material>) {
       int const slot = this->blocks.slot_begin(patch) + g * Base::width;
-      return Material::with(of_patch, memory.template at<T, Base::lanes>(slot));
+      return Material::with(of_patch, memory.template at<T>(slot));
     } else {
       (void)patch, (void)g;
       return of_patch;

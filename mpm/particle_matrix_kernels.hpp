@@ -13,10 +13,9 @@ template <class S, class Real, Spline K>
 struct PointReader {
   BlockViews<K, S> blocks;
   Kokkos::View<Real const*, typename S::memory> data;
-  static constexpr int lanes = BlockSweep<S, Real, K, false>::lanes;
 
   KOKKOS_FORCEINLINE_FUNCTION double number(int slot, int k) const {
-    return double(data((std::size_t(slot / lanes) * point_numbers + k) * lanes + slot % lanes));
+    return double(data(SlotLayout<S, Real, point_numbers>::place(slot, k)));
   }
   KOKKOS_FORCEINLINE_FUNCTION Weights<K, double> weights(int slot) const {
     return Weights<K, double>({number(slot, 0), number(slot, 1), number(slot, 2)});
@@ -145,7 +144,7 @@ struct AssembleBlocks {
         before + ((1 / dx) * reader.gradient(slot, blocks.nodes_of(patch), displacement)) * before;
     auto own = materials(blocks.material(patch));
     if constexpr (RememberingMaterial<Material>) {
-      auto const [limit, gained] = memory.template at<Real, decltype(reader)::lanes>(slot);
+      auto const [limit, gained] = memory.template at<Real>(slot);
       own = Material::with(own, YieldMemory<double>{double(limit), double(gained)});
     }
     auto const frame = Material::frame(Material::evaluate(own, F));

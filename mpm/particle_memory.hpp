@@ -23,31 +23,26 @@ concept RememberingMaterial = ElementMaterial<M> &&
 
 namespace kernels {
 
-/// Per slot (particle_blocks.hpp): [pack][number][lane].
+/// Per slot (particle_blocks.hpp).
 template <class S, class Real>
 struct PointMemory {
   static constexpr int numbers = 2;
+  using Layout = SlotLayout<S, Real, numbers>;
   Kokkos::View<Real*, typename S::memory> data;
 
-  template <int lanes>
-  KOKKOS_FORCEINLINE_FUNCTION Real* own(int slot) const {
-    return data.data() + std::size_t(slot / lanes) * numbers * lanes + slot % lanes;
-  }
-  template <class T, int lanes>
+  template <class T>
   KOKKOS_FORCEINLINE_FUNCTION YieldMemory<T> at(int slot) const {
-    Real const* const from = own<lanes>(slot);
-    return {load<T>(from), load<T>(from + lanes)};
+    Real const* const from = data.data();
+    return {load<T>(from + Layout::place(slot, 0)), load<T>(from + Layout::place(slot, 1))};
   }
-  template <int lanes>
   KOKKOS_FORCEINLINE_FUNCTION void write(int slot, YieldMemory<double> const& memory) const {
-    Real* const to = own<lanes>(slot);
-    to[0] = static_cast<Real>(memory.limit);
-    to[lanes] = static_cast<Real>(memory.gained);
+    data(Layout::place(slot, 0)) = static_cast<Real>(memory.limit);
+    data(Layout::place(slot, 1)) = static_cast<Real>(memory.gained);
   }
 };
 
 /// Where a step begins, from the particles as they are.
-template <class S, class Precision, class Material, Spline K, int lanes>
+template <class S, class Precision, class Material, Spline K>
 struct Remember {
   using Real = typename Precision::real;
   BlockViews<K, S> blocks;
@@ -59,8 +54,8 @@ struct Remember {
     auto const material = materials(blocks.material(patch));
     for (int slot = blocks.slot_begin(patch); slot < blocks.slot_end(patch); ++slot) {
       int const p = blocks.like(slot);
-      memory.template write<lanes>(slot, Material::remember(material, matrix_at(particles.F, p),
-                                                            double(particles.plastic(p))));
+      memory.write(slot, Material::remember(material, matrix_at(particles.F, p),
+                                            double(particles.plastic(p))));
     }
   }
 };
@@ -71,7 +66,6 @@ template <class Reader, class S, class Precision, class Material, class Displace
 struct RememberAnew {
   using Real = typename Precision::real;
   using Sum = typename Precision::sum;
-  static constexpr int lanes = Reader::lanes;
   Reader reader;
   Particles<Precision, S> particles;
   Kokkos::View<typename Material::template Parameters<double> const*, typename S::memory> materials;
@@ -90,11 +84,11 @@ struct RememberAnew {
       YieldMemory<double> const now =
           Material::remember(material, before + (1 / dx) * (G * before),
                              double(particles.plastic(blocks.particle(slot))));
-      double const change = now.limit - double(memory.template at<Real, lanes>(slot).limit);
+      double const change = now.limit - double(memory.template at<Real>(slot).limit);
       double const weight = reader.number(slot, 12);
       sums[0] += static_cast<Sum>(weight * change * change);
       sums[1] += static_cast<Sum>(weight * now.limit * now.limit);
-      memory.template write<lanes>(slot, now);
+      memory.write(slot, now);
     }
   }
 };

@@ -19,8 +19,8 @@
 
 namespace taut {
 
-/// `T` is the scalar of the coarser levels, `FineT` that of the fine one. Floats do for a
-/// metric: iterations are the same, and what a step ends at is the gradient's to say.
+/// `T` is the scalar of the coarser levels, `FineT` that of the fine one. Floats do for a metric:
+/// iterations hardly change, and what a step ends at is the gradient's to say.
 template <bool assembled_ = false, class FineSmoother_ = Chebyshev,
           class Smoother_ = ForwardBackward, class Embedding_ = LinearEmbedding, class T = float,
           Spline K = QuadraticSpline, class FineT = T>
@@ -45,9 +45,6 @@ struct Strengthening {
   double light = 0.1;       ///< what LightNodes takes
   int most_light = 3000;    ///< nodes; the cycle stays plain where there are more
   int sparse_nodes = 2000;  ///< of the coarsest level
-  /// Updates that a strong cycle is kept for: it takes some ten times as long to make. A metric
-  /// that is renewed in every iteration is not kept.
-  int keep = 3;
 };
 
 template <class P = Mixed, class S = DefaultSpace, class Policies = ParticleCyclePolicies<>>
@@ -94,15 +91,13 @@ public:
 
   /// A minimisation begins.
   void start() {
-    applied_ = kept_ = 0;
+    applied_ = 0;
     strong_ = false;
   }
   /// Takes the Hessian at x, and builds the hierarchy.
   template <class E>
   void update(E& e, VectorField<typename P::position, S> const& x) {
     Strengthening const& strong = params_.strengthening;
-    if (strong_ && params_.refresh.interval != 1 && ++kept_ < strong.keep) return;
-    kept_ = 0;
     operator_.linearise(e, x, local_);
     if constexpr (!assembled) {
       strong_ = strong.from > 0 && applied_ + 1 >= strong.from &&
@@ -139,7 +134,7 @@ public:
       int const n = fine_.size();
       for_each<S>("round_gradient", n, kernels::ConvertVectors<S, Real, FineReal>{g, rounded_[0]});
       apply_strong(rounded_[0], rounded_[1]);
-      for_each<S>("round_gradient", n, kernels::ConvertVectors<S, FineReal, Real>{rounded_[1], z});
+      for_each<S>("widen_step", n, kernels::ConvertVectors<S, FineReal, Real>{rounded_[1], z});
     } else {
       apply_strong(g, z);
     }
@@ -153,6 +148,8 @@ public:
   }
 
   MultigridReport const& report() const { return cycle_.report(); }
+  /// Bytes of the hierarchy and of what it is made from.
+  std::size_t memory() const { return cycle_.report().memory + operator_.memory(); }
   /// Whether the last update has strengthened the cycle.
   bool strong() const { return strong_; }
   /// Nodes that the last cycle solves with exactly.
@@ -187,7 +184,6 @@ private:
   LightNodes<S, FineReal, Kernel::width - 1> light_;
   FineVectors rounded_[2];   ///< what a strong cycle starts from, and what it makes of it
   mutable int applied_ = 0;  ///< times in this minimisation
-  int kept_ = 0;             ///< updates that a strong cycle has seen
   bool strong_ = false;
 };
 

@@ -133,7 +133,9 @@ public:
     add_local(matrix, row_of);
   }
   /// Bytes held.
-  std::size_t memory() const { return (numbers_.span() + partial_.span()) * sizeof(T); }
+  std::size_t memory() const {
+    return (numbers_.span() + partial_.span() + local_.span()) * sizeof(T);
+  }
 
 private:
   template <class Kernel>

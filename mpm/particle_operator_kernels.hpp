@@ -17,17 +17,27 @@ KOKKOS_FORCEINLINE_FUNCTION constexpr int operator_number(int q, int r) {
   return q >= r ? 3 + q * (q + 1) / 2 + r : 3 + r * (r + 1) / 2 + q;
 }
 
-/// Where they are written to, one or a pack at a time: [pack of T][number][lane].
+template <class S, class T>
+using OperatorLayout = SlotLayout<S, T, operator_numbers>;
+
+/// Where they are written to, one or a pack at a time, which may be narrower or wider than one of
+/// T.
 template <class S, class T>
 struct OperatorNumbers {
-  static constexpr int lanes = S::on_host ? host_lanes<T> : 32;
+  using Layout = OperatorLayout<S, T>;
   Kokkos::View<T*, typename S::memory> to;
 
   /// Number k of the particles from `slot` on.
   template <class Value>
   KOKKOS_FORCEINLINE_FUNCTION void set(int slot, int k, Value const& value) const {
-    store_as(value,
-             to.data() + (std::size_t(slot / lanes) * operator_numbers + k) * lanes + slot % lanes);
+    constexpr int width = ScalarTraits<Value>::lanes;
+    if constexpr (width <= Layout::lanes) {
+      store_as(value, to.data() + Layout::place(slot, k));
+    } else {
+      ValueType<Value> own[width];
+      store(value, own);
+      for (int l = 0; l < width; ++l) to(Layout::place(slot + l, k)) = static_cast<T>(own[l]);
+    }
   }
 };
 
@@ -83,9 +93,8 @@ struct OperatorSweep : BlockSweep<S, T_, K, packed> {
   Kokkos::View<T_*, typename S::memory> partial;
 
   KOKKOS_FORCEINLINE_FUNCTION T_ const* group(int patch, int g) const {
-    return data.data() + std::size_t(operator_numbers) * this->blocks.slot_begin(patch) +
-           std::size_t(g / Base::per_pack) * operator_numbers * Base::lanes +
-           g % Base::per_pack * Base::width;
+    return data.data() +
+           OperatorLayout<S, T_>::place(this->blocks.slot_begin(patch) + g * Base::width);
   }
   KOKKOS_FORCEINLINE_FUNCTION static T number(T_ const* group, int k) {
     return load<T>(group + k * Base::lanes);

@@ -115,10 +115,9 @@ struct SplitParticles : ParticleSweep<S, Precision, Material, K, packed> {
     auto const of_patch = this->material(patch);
     T const k(static_cast<Real>(stiffness(this->blocks.material(patch))));
     auto const points = this->points(patch, this->data.data());
-    Real* const all = state.data() + std::size_t(split_numbers) * this->blocks.slot_begin(patch);
     auto const body = [&](int g, bool active) __attribute__((always_inline)) {
-      Real* const own = all + std::size_t(g / Base::per_pack) * split_numbers * Base::lanes +
-                        g % Base::per_pack * Base::width;
+      Real* const own = state.data() + SlotLayout<S, Real, split_numbers>::place(
+                                           this->blocks.slot_begin(patch) + g * Base::width);
       std::uint16_t const* const corner = points.corners(g);
       Weights<K, T> const at = points.weights(g);
       Mat3<T> const before = points.deformation(g);

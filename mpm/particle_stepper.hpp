@@ -119,8 +119,7 @@ public:
       }
     }
     report.time_step = h;
-    to_particles<K>(particles, grid.blocks(), state_.x, grid.rest(), state_.v, grid.velocity(), h,
-                    grid.dx(), transfer_, flow_);
+    grid.to_particles(particles, state_.x, state_.v, h, transfer_, flow_);
     Space::instance().fence("taut: particle step");
     return report;
   }

@@ -37,7 +37,7 @@ RitzValue largest_ritz_value(std::vector<double> const& diagonal,
       largest_tridiagonal(diagonal, {beside.begin(), beside.begin() + std::ptrdiff_t(n - 1)});
   // The eigenvector row by row, of which the last number tells the residual.
   double before = 0, last = 1, square = 1;
-  for (std::size_t i = 0; i + 1 < n && beside[i] > 0; ++i) {
+  for (std::size_t i = 0; i + 1 < n; ++i) {
     double const next =
         ((value - diagonal[i]) * last - (i > 0 ? beside[i - 1] * before : 0)) / beside[i];
     before = last;

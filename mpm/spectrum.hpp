@@ -20,7 +20,8 @@ struct RitzValue {
   double value = 1;     ///< from below
   double residual = 0;  ///< an eigenvalue lies within this of it
 };
-/// After as many steps as there are entries in both.
+/// After as many steps, one or more, as there are entries in both; all of `beside` but the last are
+/// above 0.
 RitzValue largest_ritz_value(std::vector<double> const& diagonal,
                              std::vector<double> const& beside);
 
@@ -180,9 +181,10 @@ double largest_eigenvalue(A const& a, LevelVectors<T, S> const& v, int steps = 2
         reducer.template sum<1>("lanczos_form", n, kernels::VectorDot<S, T>{v.d, v.y})[0];
     if (!(form > 0 && rho > 0)) break;  // found everything, or A is not positive
     double const alpha = rho / form;
-    diagonal.push_back(1 / alpha + beta / alpha_before);
     residual.alpha = T(alpha);
     double const next = reduce();
+    if (!std::isfinite(next)) break;
+    diagonal.push_back(1 / alpha + beta / alpha_before);
     beta = next / rho;
     beside.push_back(std::sqrt(std::max(beta, 0.0)) / alpha);
     alpha_before = alpha;

@@ -101,7 +101,7 @@ struct Collected {
 };
 
 /// Leaves mass and momentum of each patch in rows of four.
-template <class S, class Precision, Spline K, bool packed = S::on_host>
+template <class S, class Precision, Spline K, bool packed>
 struct ToGrid : BlockSweep<S, typename Precision::position, K, packed> {
   using Scalar = typename Precision::position;
   using Base = BlockSweep<S, Scalar, K, packed>;
@@ -236,8 +236,7 @@ struct NodeTravel {
 };
 
 /// Moves the particles of a patch to the end of the step.
-template <class S, class Precision, Spline K, class Transfer_, class Flow_,
-          bool packed = S::on_host>
+template <class S, class Precision, Spline K, class Transfer_, class Flow_, bool packed>
 struct ToParticles : BlockSweep<S, typename Precision::position, K, packed> {
   using Scalar = typename Precision::position;
   using Base = BlockSweep<S, Scalar, K, packed>;
@@ -251,26 +250,29 @@ struct ToParticles : BlockSweep<S, typename Precision::position, K, packed> {
   Transfer_ transfer;
   Flow_ flow;
 
-  std::size_t scratch_bytes() const { return 3 * Base::row_bytes(3); }
+  std::size_t scratch_bytes() const { return (flips() ? 3 : 2) * Base::row_bytes(3); }
 
   KOKKOS_FUNCTION void operator()(typename S::team_member const& team) const {
     int const patch = team.league_rank();
     Local const u(team.team_scratch(0), 4 * Base::nodes);
     Local const after(team.team_scratch(0), 4 * Base::nodes);
-    Local const before(team.team_scratch(0), 4 * Base::nodes);
+    Local const before(team.team_scratch(0), flips() ? 4 * Base::nodes : 0);
     Scalar const origin[3] = {0, 0, 0};
     this->load_from(team, patch, displacement, origin, u);
     this->load_from(team, patch, v, origin, after);
-    if (transfer.flip != 0) this->load_from(team, patch, v_before, origin, before);
+    if (flips()) this->load_from(team, patch, v_before, origin, before);
     team.team_barrier();
     int const slots = this->blocks.slot_begin(patch);
     auto const body = [&](int g) __attribute__((always_inline)) {
       move(slots + g * Base::width, u.data(), after.data(), before.data());
     };
-    Kokkos::parallel_for(Kokkos::TeamThreadRange(team, this->groups(patch)), body);
+    int const groups = packed ? this->groups(patch) : this->blocks.count(patch);
+    Kokkos::parallel_for(Kokkos::TeamThreadRange(team, groups), body);
   }
 
 private:
+  KOKKOS_FORCEINLINE_FUNCTION bool flips() const { return transfer.flip != 0; }
+
   /// What the nodes make of a particle.
   struct Seen {
     Vec3<double> v, before, travel;
@@ -301,7 +303,7 @@ private:
     Mat3<T> const B = Base::sums(at.w, first, corner, after, value);
     keep(12, value, 3);
     keep(15, B.a, 9);
-    if (transfer.flip != 0) {
+    if (flips()) {
       Base::sums(at.w, at.d, corner, before, value);
       keep(24, value, 3);
     }
@@ -313,7 +315,7 @@ private:
       for (int k = 0; k < 3; ++k) {
         seen.travel[k] = number(k);
         seen.v[k] = number(12 + k);
-        if (transfer.flip != 0) seen.before[k] = number(24 + k);
+        if (flips()) seen.before[k] = number(24 + k);
       }
       for (int k = 0; k < 9; ++k) {
         seen.G.a[k] = number(3 + k);
@@ -336,7 +338,7 @@ private:
     double const flip = transfer.flip;
     for (int k = 0; k < 3; ++k) {
       double const flipped = double(particles.v(p, k)) + seen.v[k] - seen.before[k];
-      double const new_v = flip != 0 ? (1 - flip) * seen.v[k] + flip * flipped : seen.v[k];
+      double const new_v = flips() ? (1 - flip) * seen.v[k] + flip * flipped : seen.v[k];
       particles.v(p, k) = static_cast<Scalar>(new_v);
       particles.x(p, k) = static_cast<Scalar>(double(particles.x(p, k)) + seen.travel[k]);
     }
@@ -352,12 +354,18 @@ private:
 
 }  // namespace kernels
 
-/// Masses and velocities of the nodes of a grid, and the way to and from particles.
-template <Spline K, class Precision = Mixed, class Space = DefaultSpace>
+/// Masses and velocities of the nodes of a grid, and the way to and from particles. `packed` as for
+/// BlockSweep.
+template <Spline K, class Precision = Mixed, class Space = DefaultSpace,
+          bool packed = Space::on_host>
 class GridTransfer {
 public:
   using Scalar = typename Precision::position;
   using Positions = VectorField<Scalar, Space>;
+  using Blocks = ParticleBlocks<K, Space>;
+
+  /// `team_size`: threads per patch where not packed.
+  explicit GridTransfer(int team_size = 64) : team_size_(packed ? 1 : team_size) {}
 
   /// Of the nodes.
   Array<Scalar, Space> const& mass() const { return mass_; }
@@ -370,16 +378,16 @@ public:
   /// the square of what slopes do, for all but linear splines), but a node without mass makes no
   /// sense to a minimiser: masses are raised to eps^2 times the largest, which changes nothing that
   /// survives rounding.
-  void to_grid(Particles<Precision, Space> const& particles, ParticleBlocks<K, Space> const& blocks,
-               int nodes, double dx) {
+  void to_grid(Particles<Precision, Space> const& particles, Blocks const& blocks, int nodes,
+               double dx) {
     auto const& views = blocks.views();
     mass_ = mass_memory_.resize("node_mass", nodes);
     velocity_ = velocity_memory_.resize("node_velocity", nodes);
     grow(partial_, "transfer_partial",
          std::size_t(4) * BlockViews<K, Space>::nodes * views.patches);
-    kernels::ToGrid<Space, Precision, K> const kernel{{views}, {particles, dx}, partial_};
-    for_each_team<Space>("particles_to_grid", views.patches, Space::on_host ? 1 : 64,
-                         kernel.scratch_bytes(), kernel);
+    kernels::ToGrid<Space, Precision, K, packed> const kernel{{views}, {particles, dx}, partial_};
+    for_each_team<Space>("particles_to_grid", views.patches, team_size_, kernel.scratch_bytes(),
+                         kernel);
     using Write = kernels::WriteNodes<Space, Scalar>;
     for_each<Space>(
         "gather_nodes", nodes,
@@ -392,7 +400,20 @@ public:
                         mass_, velocity_, static_cast<Scalar>(eps * eps * largest)});
   }
 
+  /// Moves particles by a step of h seconds in which the nodes went from `rest` to x, and their
+  /// velocities changed from velocity() to v.
+  template <Transfer T, Flow F>
+  void to_particles(Particles<Precision, Space> const& particles, Blocks const& blocks,
+                    Positions const& x, Positions const& rest, Positions const& v, double h,
+                    double dx, T const& transfer, F const& flow) const {
+    kernels::ToParticles<Space, Precision, K, T, F, packed> const kernel{
+        {blocks.views()}, {particles, dx}, {x, rest}, {v}, {velocity_}, h, transfer, flow};
+    for_each_team<Space>("to_particles", blocks.views().patches, team_size_, kernel.scratch_bytes(),
+                         kernel);
+  }
+
 private:
+  int team_size_;
   Array<Scalar, Space> mass_;
   Positions velocity_;
   Resizable<Array<Scalar, Space>> mass_memory_;
@@ -408,19 +429,6 @@ double farthest_travel(Particles<Precision, Space> const& particles,
   return maximum<Space>(
       "particle_travel", blocks.views().patches, 0.0,
       kernels::ParticleTravel<Space, Precision, K>{blocks.views(), {particles, dx}, x, rest});
-}
-
-/// Moves particles by a step of h seconds in which the nodes went from `rest` to x and their
-/// velocities changed from v_before to v.
-template <Spline K, class Precision, class Space, class Positions, Transfer T, Flow F>
-void to_particles(Particles<Precision, Space> const& particles,
-                  ParticleBlocks<K, Space> const& blocks, Positions const& x, Positions const& rest,
-                  Positions const& v, Positions const& v_before, double h, double dx,
-                  T const& transfer, F const& flow) {
-  kernels::ToParticles<Space, Precision, K, T, F> const kernel{
-      {blocks.views()}, {particles, dx}, {x, rest}, {v}, {v_before}, h, transfer, flow};
-  for_each_team<Space>("to_particles", blocks.views().patches, Space::on_host ? 1 : 64,
-                       kernel.scratch_bytes(), kernel);
 }
 
 }  // namespace taut

@@ -9,6 +9,7 @@
 //   gradient, gradient_blocks, quadratic_form    as a nonlinear CG takes them
 //   linearise         the 45 numbers of each particle's part of the Hessian, projected
 //   product           the Hessian from these times a vector
+//   linearise_fp32, product_fp32    the same in floats, as the default cycle has them
 //   assembly          the fine matrix from these
 // Per node of a level, for the default cycle and HOT's ("hot"):
 //   hierarchy         all of it, from the positions of the nodes on

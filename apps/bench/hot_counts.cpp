@@ -32,8 +32,10 @@ SweepCounts count_particles(std::string_view kernel, double particles) {
             weights + 2 * gradient + deformation + direction + m.state + m.form + 2};
   }
   if (kernel == "linearise") return {point + numbers + vector, 0};
-  if (kernel == "product") {
-    return {numbers + 2 * vector, weights + 2 * gradient + 2 * 81};
+  if (kernel == "linearise_fp32") return {point + numbers / 2 + vector, 0};
+  if (kernel == "product" || kernel == "product_fp32") {
+    double const bytes = numbers + 2 * vector;
+    return {kernel == "product" ? bytes : bytes / 2, weights + 2 * gradient + 2 * 81};
   }
   if (kernel == "assembly") {
     // Each gradient of the 27 contracted with the symmetric 9x9, then 378 pairs of them.

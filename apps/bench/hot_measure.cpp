@@ -111,8 +111,7 @@ private:
     sweep("to_grid", [&] { transfer.to_grid(particles_, blocks, n, grid_.dx()); });
     // From nodes that stand: whatever is done often leaves the particles where they are.
     sweep("to_particles", [&] {
-      to_particles<K>(particles_, blocks, grid_.rest(), grid_.rest(), grid_.velocity(),
-                      grid_.velocity(), h, grid_.dx(), Apic{}, NoFlow{});
+      grid_.to_particles(particles_, grid_.rest(), grid_.velocity(), h, Apic{}, NoFlow{});
     });
 
     x_ = Positions("bench_x", n);
@@ -130,6 +129,13 @@ private:
     sweep("linearise", [&] { terms_.linearise(x_, h2, hessian); });
     hessian.set_local(curvature, fixed);
     sweep("product", [&] { hessian.product(p_, g_); });
+    ParticleTerms::Rounded rounded;
+    sweep("linearise_fp32", [&] { terms_.linearise(x_, h2, rounded); });
+    BlockField<float, S> const rounded_curvature("bench_rounded_curvature", n);
+    VectorField<float, S> const p("bench_rounded_direction", n), hp("bench_rounded_product", n);
+    for_each<S>("bench_round", n, kernels::ConvertVectors<S, P::real, float>{p_, p});
+    rounded.set_local(rounded_curvature, fixed);
+    sweep("product_fp32", [&] { rounded.product(p, hp); });
     MatrixLevel<S, P::real, K::width - 1> fine;
     fine.resize(hessian.nodes(), hessian.fixed());
     sweep("assembly", [&] { hessian.matrix(fine.matrix()); });
@@ -180,7 +186,7 @@ private:
     potential_.begin_step(x_, h2, h, true);
     double const built = seconds([&] { multigrid.update(potential_, x_); });
     auto const& report = multigrid.report();
-    double const held = double(report.memory) / n;
+    double const held = double(multigrid.memory()) / n;
     add("hierarchy", "node", n, built).held = held;
     smoother(typename Policies::FineSmoother(params.cycle.fine), multigrid.fine(), 0);
     for (int l = 1; l < static_cast<int>(report.nodes.size()); ++l) {

@@ -121,8 +121,7 @@ private:
           "does not have: choose schwarz_32, or add a table [grid]");
     }
     typename Schwarz<P, Space>::Params schwarz;
-    schwarz.refresh = refresh_of(options_, {.interval = options_.integer("refresh_every"),
-                                            .trigger = Refresh::rarely().trigger});
+    schwarz.refresh = refresh_of(options_, rare_refresh(options_));
     schwarz.aggregate = name == "schwarz_16" ? 16 : 32;
     return schwarz;
   }

@@ -33,13 +33,14 @@ inline AnyStopping::Params stopping_of(SolverOptions const& options, int window)
 }
 
 /// `automatic`: what the word auto stands for.
+inline Refresh rare_refresh(SolverOptions const& options) {
+  return {.interval = options.integer("refresh_every"), .trigger = Refresh::rarely().trigger};
+}
 inline Refresh refresh_of(SolverOptions const& options, Refresh const& automatic) {
   std::string const& when = options.text("refresh");
   if (when == "auto") return automatic;
   if (when == "lagged") return Refresh::lagged(options.integer("refresh_every"));
-  if (when == "rare") {
-    return {.interval = options.integer("refresh_every"), .trigger = Refresh::rarely().trigger};
-  }
+  if (when == "rare") return rare_refresh(options);
   return {};
 }
 

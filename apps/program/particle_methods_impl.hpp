@@ -37,9 +37,9 @@ struct ParticleMinimiserHolder final : ParticleMinimiser::Interface {
   }
 };
 
-/// The iteration of a step from which on the cycle is a strong one (ParticleMultigrid). It costs as
-/// much as 50 to 80 plain iterations to make and three to apply: where the plain one gets there in
-/// fewer (twist: 340, chain: 381) it has not been faster.
+/// After how many applications in a minimisation the cycle is made a strong one
+/// (ParticleMultigrid). It costs as much as 50 to 80 plain iterations to make and three to apply:
+/// where the plain one gets there in fewer (twist: 340, chain: 381) it has not been faster.
 inline int strong_from(SolverOptions const& options) {
   std::string const& asked = options.text("strong_cycle");
   return asked == "never" ? 0 : asked == "always" ? 1 : 400;
@@ -86,7 +86,7 @@ protected:
   int window() const { return multigrid() ? 4 : 8; }
   int visits() const { return options_.text("cycle") == "w" ? 2 : 1; }
   ParticleMultigrid<P, S>::Params cycle() const {
-    return {.refresh = refresh_of(options_, Refresh::rarely()),
+    return {.refresh = refresh_of(options_, rare_refresh(options_)),
             .strengthening = {.from = strong_from(options_)},
             .cycle = {.visits = visits()}};
   }

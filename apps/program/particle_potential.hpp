@@ -37,6 +37,7 @@ public:
   using OperatorOf = ParticleOperator<ParticleKernel, T, DefaultSpace>;
   using Operator = OperatorOf<ParticlePrecision::real>;
   using Rounded = OperatorOf<float>;
+  static_assert(!std::same_as<Operator, Rounded>, "linearise is then the same twice");
   using Split = SplitParticleState<ParticlePrecision::real, DefaultSpace>;
   using Numbers = Array<double, DefaultSpace>;
 

@@ -5,9 +5,10 @@
 
 namespace taut {
 
-/// Inverse of A with its eigenvalues raised to `relative` times the largest, and to `absolute`. A
-/// that is zero (or not positive at all) and has no absolute floor gives the identity. In fp64
-/// whatever T, because a stiff contact leaves blocks that fp32 cannot invert.
+/// Inverse of A with its eigenvalues raised to `relative` times the largest, to `absolute`, and to
+/// what T can hold the inverse of. A that is zero (or not positive at all) and has no absolute
+/// floor gives the identity. In fp64 whatever T, because a stiff contact leaves blocks that fp32
+/// cannot invert.
 template <class T>
 KOKKOS_FUNCTION Sym3<T> floored_inverse(Sym3<T> const& A, double relative, double absolute) {
   double const scale = double(A.s[0]) + double(A.s[1]) + double(A.s[2]);
@@ -15,7 +16,9 @@ KOKKOS_FUNCTION Sym3<T> floored_inverse(Sym3<T> const& A, double relative, doubl
     T const one = absolute > 0 ? T(1 / absolute) : T(1);
     return {{one, one, one, 0, 0, 0}};
   }
-  double const unit = 1 / scale;
+  constexpr double tiny = 4 * double(Kokkos::Experimental::norm_min_v<T>);
+  absolute = Kokkos::max(absolute, tiny);
+  double const unit = 1 / Kokkos::max(scale, tiny);
   Sym3<double> inverse;
   for (int k = 0; k < 6; ++k) inverse.s[k] = unit * double(A.s[k]);
   absolute *= unit;

@@ -17,8 +17,9 @@ using namespace taut;
 
 TEST_CASE("what a particle cannot do without is counted", "[bench]") {
   double const particles = 5;
-  for (char const* kernel : {"to_grid", "to_particles", "change", "gradient", "quadratic_form",
-                             "linearise", "product", "assembly"}) {
+  for (char const* kernel :
+       {"to_grid", "to_particles", "change", "gradient", "quadratic_form", "linearise", "product",
+        "linearise_fp32", "product_fp32", "assembly"}) {
     CAPTURE(kernel);
     SweepCounts const some = count_particles(kernel, particles);
     CHECK(some.bytes > 0);
@@ -51,7 +52,8 @@ TEST_CASE("a row per kernel of material points, level and cycle", "[bench]") {
   }
   CHECK(kernels == std::set<std::string>{"rebuild", "to_grid", "to_particles", "change", "gradient",
                                          "gradient_blocks", "quadratic_form", "linearise",
-                                         "product", "assembly", "hierarchy", "smoother", "cycle"});
+                                         "product", "linearise_fp32", "product_fp32", "assembly",
+                                         "hierarchy", "smoother", "cycle"});
   auto const one = [&](std::string const& cycle, std::string const& kernel,
                        std::string const& per) {
     return *std::find_if(rows.begin(), rows.end(), [&](HotRow const& row) {

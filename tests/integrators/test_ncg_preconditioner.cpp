@@ -103,6 +103,17 @@ TEMPLATE_TEST_CASE("inverses of blocks are floored", "", float, double) {
   CHECK(floored_inverse(zero, 1e-4, 0.0).s[2] == 1);
 }
 
+TEST_CASE("inverses of blocks next to nothing are numbers") {
+  std::mt19937 random(5);
+  for (float unit : {1e-30f, 1e-36f, 1e-39f, 1e-44f}) {
+    CAPTURE(unit);
+    auto const inverse =
+        floored_inverse(random_block<float>({unit, 1e-3 * unit, 0}, random), 1e-6, 0.0);
+    for (float number : inverse.s) CHECK(std::isfinite(number));
+    CHECK(inverse.s[0] + inverse.s[1] + inverse.s[2] > 1e28f);
+  }
+}
+
 TEST_CASE("vanishing curvature is floored when there is no inertia") {
   toy::Chain<toy::Quartic> chain({.size = 4, .has_inertia = false});
   toy::Chain<toy::Quartic>::Positions const x("x", 4);

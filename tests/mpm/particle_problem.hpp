@@ -14,11 +14,6 @@ namespace taut::test {
 
 using Field = std::vector<Vec3<double>>;
 
-template <class Space>
-using RightOf = taut::Space<typename Space::execution, Kokkos::LayoutRight>;
-template <class Space>
-using LeftOf = taut::Space<typename Space::execution, Kokkos::LayoutLeft>;
-
 /// One combination of policies.
 template <class Model, class Filter, class Kernel_, class Precision_, class Space_, bool packed_>
 struct Combination {

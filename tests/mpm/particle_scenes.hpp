@@ -11,6 +11,11 @@
 
 namespace taut::test {
 
+template <class Space>
+using RightOf = taut::Space<typename Space::execution, Kokkos::LayoutRight>;
+template <class Space>
+using LeftOf = taut::Space<typename Space::execution, Kokkos::LayoutLeft>;
+
 /// `per_axis`^3 particles in each of the cells [0, cells)^3 around `origin` cells of `dx`, at
 /// jittered places, strained and moving. Objects and materials alternate along x.
 inline std::vector<Particle> jittered_block(int cells, int per_axis, double dx,

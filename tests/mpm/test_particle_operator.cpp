@@ -131,6 +131,24 @@ TEST_CASE("the same in float, by threads of a particle each, in a device's layou
                                                       test::team_sizes<DefaultSpace>().back());
 }
 
+TEST_CASE("an operator of doubles takes its numbers from packs of floats", "[mpm][operator]") {
+  using C = Of<Mixed, test::RightOf<DefaultSpace>, true>;
+  Linearised<C> const l;
+  ParticleOperator<QuadraticSpline, double, C::Space> wide;
+  l.problem.term.linearise(l.problem.x, 0.01, wide);
+  BlockField<double, C::Space> const local("local", l.n);
+  for (int i = 0; i < l.n; ++i)
+    for (int k = 0; k < 6; ++k) local(i, k) = double(l.local(i, k));
+  wide.set_local(local, l.problem.fixed);
+  auto const p = l.vectors(), expected = l.vectors();
+  VectorField<double, C::Space> const p_wide("p", l.n), found("found", l.n);
+  for (int i = 0; i < l.n; ++i)
+    for (int c = 0; c < 3; ++c) p_wide(i, c) = double(p(i, c) = l.problem.p(i, c));
+  l.to.product(p, expected);
+  wide.product(p_wide, found);
+  CHECK(apart(found, expected, l.n) < 1e-5);
+}
+
 TEST_CASE("a cycle without a fine matrix is that of the matrix", "[mpm][operator]") {
   using C = Of<Fp64, test::RightOf<DefaultSpace>, true>;
   using S = C::Space;

@@ -20,27 +20,27 @@ using Catch::Matchers::WithinAbs;
 using S = DefaultSpace;
 
 /// Particles, and their grid with masses and velocities.
-template <class K, class P = Fp64>
-struct Moving : test::OnGrid<K, P, S> {
-  using Base = test::OnGrid<K, P, S>;
+template <class K, class P = Fp64, class Space = S, bool packed = Space::on_host>
+struct Moving : test::OnGrid<K, P, Space> {
+  using Base = test::OnGrid<K, P, Space>;
   using Positions = typename Base::Positions;
   double dx;
-  GridTransfer<K, P, S> transfer;
-  Moving(std::vector<Particle> const& list, double spacing) : Base(list, spacing), dx(spacing) {
+  GridTransfer<K, P, Space, packed> transfer;
+  Moving(std::vector<Particle> const& list, double spacing, int team_size = 64)
+      : Base(list, spacing), dx(spacing), transfer(team_size) {
     transfer.to_grid(this->particles, this->blocks, this->nodes(), dx);
   }
   /// The same velocities, changed by `kick(i)` at node i.
   template <class Kick, class T>
   void step(double h, T const& policy, Kick const& kick) {
     int const n = this->nodes();
-    Positions const x("x", n), v("v", n), before("before", n);
+    Positions const x("x", n), v("v", n);
     for (int i = 0; i < n; ++i)
       for (int c = 0; c < 3; ++c) {
-        before(i, c) = transfer.velocity()(i, c);
-        v(i, c) = before(i, c) + kick(i)[c];
+        v(i, c) = transfer.velocity()(i, c) + kick(i)[c];
         x(i, c) = this->rest(i, c) + h * v(i, c);
       }
-    to_particles(this->particles, this->blocks, x, this->rest, v, before, h, dx, policy, NoFlow{});
+    transfer.to_particles(this->particles, this->blocks, x, this->rest, v, h, dx, policy, NoFlow{});
   }
 };
 auto const no_kick = [](int) { return Vec3<double>{}; };
@@ -148,6 +148,48 @@ TEMPLATE_TEST_CASE("what a transfer can represent comes back as it was", "[mpm][
   auto const end = scene.particles.read();
   for (std::size_t p = 0; p < list.size(); ++p) {
     CHECK_THAT(norm(end[p].v - list[p].v - Vec3<double>{0, 0, 0.5}), WithinAbs(0, 1e-12));
+  }
+}
+
+TEMPLATE_TEST_CASE("threads of a particle each, in a device's layout, transfer what packs do",
+                   "[mpm][transfer]", LinearSpline, QuadraticSpline, CubicSpline) {
+  double const dx = 0.1, h = 0.02;
+  // Cells with more and with fewer particles than others, so that rounds are of all lengths.
+  auto list = test::jittered_block(5, 2, dx, {-2.3, 5.2, 6.6});
+  auto const more = test::jittered_block(2, 3, dx, {-1.3, 6.2, 7.6}, 1, 0.1, 3);
+  list.insert(list.end(), more.begin(), more.end());
+  auto const kick = [](int i) { return Vec3<double>{0.1 * (i % 7), -0.2, 0.05 * (i % 3)}; };
+  auto const check = [&](auto const& policy, int team) {
+    CAPTURE(policy.flip, team);
+    using Threads = Moving<TestType, Fp64, test::LeftOf<S>, false>;
+    Moving<TestType> packs(list, dx);
+    Threads threads(list, dx, team);
+    REQUIRE(packs.nodes() == threads.nodes());
+    for (int i = 0; i < packs.nodes(); ++i) {
+      double const m = packs.transfer.mass()(i);
+      CHECK_THAT(threads.transfer.mass()(i), WithinAbs(m, 1e-14));
+      for (int c = 0; c < 3; ++c) {
+        CHECK_THAT(m * threads.transfer.velocity()(i, c),
+                   WithinAbs(m * packs.transfer.velocity()(i, c), 1e-14));
+      }
+    }
+    // From one velocity on, for that of a node without mass is round-off.
+    assign(threads.transfer.velocity(), packs.transfer.velocity());
+    packs.step(h, policy, kick);
+    threads.step(h, policy, kick);
+    auto const a = packs.particles.read(), b = threads.particles.read();
+    for (std::size_t p = 0; p < list.size(); ++p) {
+      CHECK_THAT(norm(a[p].x - b[p].x), WithinAbs(0, 1e-13));
+      CHECK_THAT(norm(a[p].v - b[p].v), WithinAbs(0, 1e-12));
+      for (int c = 0; c < 9; ++c) {
+        CHECK_THAT(a[p].C.a[c], WithinAbs(b[p].C.a[c], 1e-11));
+        CHECK_THAT(a[p].F.a[c], WithinAbs(b[p].F.a[c], 1e-12));
+      }
+    }
+  };
+  for (int const team : test::team_sizes<S>()) {
+    check(Apic{}, team);
+    check(PicFlip{0.95}, team);
   }
 }
 
