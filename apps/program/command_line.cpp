@@ -5,6 +5,10 @@
 
 #include <fmt/core.h>
 
+#ifdef _OPENMP
+#include <omp.h>
+#include <sched.h>
+#endif
 #include <unistd.h>
 
 #include <algorithm>
@@ -12,6 +16,7 @@
 #include <filesystem>
 #include <new>
 #include <string_view>
+#include <vector>
 
 namespace taut {
 
@@ -38,7 +43,28 @@ std::string unexpected_words(std::string const& command, std::vector<std::string
                      suggestion(": did you mean ", name, views, "?"), command);
 }
 
+namespace {
+
+/// Where OMP_PROC_BIND is set, OpenMP has bound this thread to one place before main begins, and
+/// what the process becomes, or starts, would have no other. Gives back all places there were.
+void leave_place() {
+#ifdef _OPENMP
+  cpu_set_t all;
+  CPU_ZERO(&all);
+  for (int place = 0; place < omp_get_num_places(); ++place) {
+    std::vector<int> cpus(static_cast<std::size_t>(omp_get_place_num_procs(place)));
+    omp_get_place_proc_ids(place, cpus.data());
+    for (int const cpu : cpus)
+      if (cpu < CPU_SETSIZE) CPU_SET(static_cast<unsigned>(cpu), &all);
+  }
+  if (CPU_COUNT(&all) > 0) sched_setaffinity(0, sizeof all, &all);
+#endif
+}
+
+}  // namespace
+
 int hand_over(std::string const& program, char** argv, std::string const& what) {
+  leave_place();
   if (char const* build = std::getenv("TAUT_BUILD")) {
     if (std::system(fmt::format("{} {}", build, program).c_str()) != 0) {
       fmt::print(stderr, "taut: {} is of {}, which could not be built\n", what, program);

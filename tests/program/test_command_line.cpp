@@ -102,6 +102,17 @@ TEST_CASE("without the whole program, or with a build that fails, it is named", 
   CHECK_THAT(unbuilt.text, ContainsSubstring("could not be built"));
 }
 
+TEST_CASE("a program that takes over from a bound one has all its processors", "[cli]") {
+  // What builds it is started like it, and tells.
+  std::string const status = "grep Cpus_allowed: /proc/self/status";
+  test::Outcome const own = test::outcome_of(status);
+  REQUIRE_THAT(own.text, ContainsSubstring("Cpus_allowed:"));
+  test::Outcome const bound = test::outcome_of("OMP_PROC_BIND=true TAUT_BUILD='" + status + ";:' " +
+                                               test::program().string() + " bench --help");
+  CHECK(bound.status == 0);
+  CHECK_THAT(bound.text, ContainsSubstring(own.text));
+}
+
 TEST_CASE("scenes go on past a broken file", "[cli]") {
   test::ScratchFolder const folder;
   auto const broken = folder.write("broken.toml", "[[=");
