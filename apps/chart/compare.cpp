@@ -35,7 +35,16 @@ public:
   }
 
   std::string run(MoreTables& more) {
-    for (auto const& file : files_) run(file);
+    for (auto const& file : files_) {
+      try {
+        run(file);
+      } catch (Error const& error) {
+        // One of several must not cost what the others have taken.
+        if (files_.size() == 1) throw;
+        leave_out(load_scene(file, options_.scene.changes).name, error.what());
+      }
+    }
+    if (rows_.empty()) throw Error("no scene can be compared; the last one: {}", last_error_);
     if (!options_.fields.empty()) {
       more["fields.csv"] = "scene,frame,method,iteration,x,y,z,error,residual\n" + fields_;
     }
@@ -79,6 +88,12 @@ private:
       compare(file, scene.name + " without contact", *steps_alone, alone,
               steps_alone->solve(step.before, frame));
     }
+  }
+
+  void leave_out(std::string const& name, std::string const& why) {
+    last_error_ = why;
+    header_ += fmt::format("# left_out = {}: {}\n", name, why);
+    fmt::print(stderr, "taut: {} is left out: {}\n", name, why);
   }
 
   void compare(std::filesystem::path const& file, std::string const& name, ChartScene const& scene,
@@ -169,6 +184,7 @@ private:
   std::vector<ChartMethod> const& methods_;
   std::vector<std::filesystem::path> files_;
   std::string header_, rows_, fields_;
+  std::string last_error_;  ///< of a scene that is left out
 };
 
 }  // namespace

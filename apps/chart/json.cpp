@@ -77,7 +77,7 @@ std::string to_json(std::string const& table) {
       std::size_t const at = line.find(" = ");
       std::string const name = line.substr(2, at - 2);
       Json const value = value_of(line.substr(at + 3));
-      if (name == "with") {  // any number of them
+      if (name == "with" || name == "left_out") {  // any number of them
         facts[name].push_back(value);
       } else {
         facts[name] = value;

@@ -69,7 +69,7 @@ MeshMeasure::MeshMeasure(Scene const& scene, SceneGeometry const& geometry, int 
 
   length_ = length ? *length : largest_distance(before, solution_);
   if (!(length_ > 0)) {
-    throw Error("{}: nothing moves in step {}: compare another one with --frame", scene.name, step);
+    throw Error("nothing moves in step {}: compare another one with --frame", step);
   }
   unit_energy_ = energy_above(before);
 }

@@ -49,7 +49,7 @@ def read(path):
         for line in file:
             if line.startswith("# "):
                 name, _, value = line[2:].rstrip("\n").partition(" = ")
-                if name == "with":
+                if name in ("with", "left_out"):
                     facts.setdefault(name, []).append(value)
                 else:
                     facts[name] = value
@@ -606,7 +606,7 @@ def write(out, facts, rows, drawn, by_residual=False):
         figure.subplots_adjust(left=0.02, right=0.98, wspace=0.15, hspace=0.5, bottom=0.75 / inches)
     if facts["kind"] == "comparison" and len(figure.axes) > 1 and not panels:  # fields
         figure.subplots_adjust(left=0.02, right=0.88, wspace=0.06, hspace=0.14, bottom=0.1 / inches)
-    for name in facts.keys() - {"with"}:
+    for name in facts.keys() - {"with", "left_out"}:
         facts[name] = re.sub(r"e\+0?", "e", facts[name])
     title = ", ".join([facts["scene"], *facts.get("with", [])])
     figure.text(0.02, 1 - 0.12 / inches, title, va="top", fontsize=13, fontweight="bold")
@@ -618,6 +618,8 @@ def write(out, facts, rows, drawn, by_residual=False):
     if len(below_title) > 165:
         below_title = below_title.replace(".  ", ".\n", 1)
     figure.text(0.02, 1 - 0.40 / inches, below_title, va="top", color="#666666")
+    left_out = "\n".join(f"left out: {scene}" for scene in facts.get("left_out", []))
+    figure.text(0.02, 0.06 / inches, left_out, va="bottom", fontsize="small", color="#666666")
     for axes in rated:
         add_rates(axes)
     figure.canvas.draw()  # fixes the limits that labels are placed by

@@ -229,6 +229,26 @@ TEST_CASE("policies are named by their keys", "[chart][contact]") {
                        MessageMatches(ContainsSubstring("twice")));
 }
 
+TEST_CASE("a scene that cannot be compared does not cost the others", "[chart][contact]") {
+  ScratchFolder const folder;
+  ChartOptions options = options_for(folder, falling);
+  options.methods = {"newton"};
+  options.with = {
+      folder.write("still.toml", replaced(plain_scene, "[0, -10, 0]", "[0, 0, 0]")).string()};
+  Data const data = chart(options);
+  CHECK_THAT(data.header, ContainsSubstring("# left_out = plain: nothing moves"));
+  CHECK(!data.rows.empty());
+  CHECK(data.rows.back().at("ended") == "accurate");
+  CHECK(read_json(options).at("facts").at("left_out").size() == 1);
+  options.force = true;
+  options.scene.scene = options.with.front();
+  CHECK_THROWS_MATCHES(chart_command(options), Error,
+                       MessageMatches(ContainsSubstring("no scene can be compared")));
+  options.with = {};
+  CHECK_THROWS_MATCHES(chart_command(options), Error,
+                       MessageMatches(ContainsSubstring("nothing moves")));
+}
+
 TEST_CASE("charts that mix what does not belong together are refused", "[chart][contact]") {
   ScratchFolder const folder;
   ChartOptions options = options_for(folder, falling);
