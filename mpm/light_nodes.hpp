@@ -40,7 +40,8 @@ public:
     grow(rows_.entry, "light_rows", static_cast<std::size_t>(count));
     for_each<S>("light_rows", count, kernels::ZeroRow<Rows>{rows_});
     action.add_rows(rows_, part_);
-    on_ = block_.factorize(rows_, part_, count, true, 16 * double(std::numeric_limits<T>::epsilon()));
+    on_ =
+        block_.factorize(rows_, part_, count, true, 16 * double(std::numeric_limits<T>::epsilon()));
     grow(r_, "light_residual", n);
     grow(z_, "light_cycle", n);
     return on_;
