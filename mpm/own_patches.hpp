@@ -45,6 +45,7 @@ struct TakeOwnPatch {
     to.count(k) = own.all.count(patch);
     to.material(k) = own.all.material(patch) - own.materials.first;
     to.block(k) = own.all.block(patch);
+    to.heart(k) = own.all.heart(patch);
   }
 };
 template <Spline K, class S>
@@ -97,9 +98,10 @@ public:
     own_.count = provide(memory_[2], "own_patch_count", patches);
     own_.material = provide(memory_[3], "own_patch_material", patches);
     own_.block = provide(memory_[4], "own_patch_block", patches);
-    own_.patch_begin = provide(memory_[5], "own_patch_begin", all.blocks + 1);
-    own_.row = provide(memory_[6], "own_node_row", total);
-    own_.row_begin = provide(memory_[7], "own_row_begin", nodes + 1);
+    own_.heart = provide(memory_[5], "own_patch_heart", patches);
+    own_.patch_begin = provide(memory_[6], "own_patch_begin", all.blocks + 1);
+    own_.row = provide(memory_[7], "own_node_row", total);
+    own_.row_begin = provide(memory_[8], "own_row_begin", nodes + 1);
     for_each<S>("own_patches", all.patches, kernels::TakeOwnPatch<K, S>{own, patches_before, own_});
     for_each<S>("own_blocks", all.blocks + 1,
                 kernels::BeginOwn<S>{all.patch_begin, patches_before, own_.patch_begin});
@@ -118,7 +120,7 @@ private:
   }
 
   Views own_;
-  List patch_scan_, row_scan_, memory_[8];
+  List patch_scan_, row_scan_, memory_[9];
 };
 
 }  // namespace taut

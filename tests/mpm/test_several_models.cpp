@@ -263,6 +263,29 @@ TEST_CASE("two models share them in a device's layout, a thread a particle", "[m
   check_idle<LeftOf<DefaultSpace>, false>(team);
 }
 
+TEST_CASE("own patches are what they were among all", "[mpm][models]") {
+  Mixture<RightOf<DefaultSpace>, true> const m(1);
+  auto const& all = m.scene.blocks.views();
+  OwnPatches<QuadraticSpline> patches;
+  auto const& own = patches.select(all, {1, 3}, m.scene.nodes());
+  REQUIRE(own.patches > 0);
+  REQUIRE(own.patches < all.patches);
+  int k = 0;
+  for (int patch = 0; patch < all.patches; ++patch) {
+    CHECK(all.nodes_of(patch)[all.heart(patch)] >= 0);
+    if (all.material(patch) == 0) continue;
+    REQUIRE(k < own.patches);
+    CHECK(own.material(k) == all.material(patch) - 1);
+    CHECK(own.slot_begin(k) == all.slot_begin(patch));
+    CHECK(own.slot_end(k) == all.slot_end(patch));
+    CHECK(own.count(k) == all.count(patch));
+    CHECK(own.block(k) == all.block(patch));
+    CHECK(own.heart(k) == all.heart(patch));
+    ++k;
+  }
+  CHECK(k == own.patches);
+}
+
 TEST_CASE("steps of two terms are those of one", "[mpm][models]") {
   check_minimiser<Lbfgs<ParticleMultigrid, SufficientDecrease, DecrementWindow, P>>(1e-9);
   check_minimiser<Ncg<DaiKou, BlockJacobi, SufficientDecrease, DecrementWindow, P>>(1e-9);
