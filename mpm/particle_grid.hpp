@@ -106,9 +106,8 @@ public:
   GridNodes<Space> const& nodes() const { return grid_.nodes(); }
   int size() const { return unknowns_.size(); }
   Positions const& rest() const { return rest_; }  ///< places of the nodes, m
-  Positions const& velocity() const {
-    return transfer_.velocity();
-  }  ///< where the step begins, m/s
+  /// Where the step begins, m/s.
+  Positions const& velocity() const { return transfer_.velocity(); }
 
   /// Makes the grid around particles of `materials` materials, and brings their mass and momentum
   /// to it. Throws Error for a particle of which something is not a number, or that is out of

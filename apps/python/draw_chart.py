@@ -562,10 +562,12 @@ def draw_totals(facts, rows):
 
 
 def describe(facts, by_residual):
-    size = next(name for name in ("tets", "particles") if name in facts)
-    text = "" if "with" in facts else f"{int(facts[size]):,} {size}, "
-    text += (f"{facts['materials']}, {facts['integrator']} with {facts['step_s']} s, "
-             f"{facts['threads']} thread{'' if facts['threads'] == '1' else 's'}.  ")
+    text = f"{facts['integrator']}, "
+    if "with" not in facts:  # scenes have these of their own
+        size = next(name for name in ("tets", "particles") if name in facts)
+        text = (f"{int(facts[size]):,} {size}, {facts['materials']}, {facts['integrator']} with "
+                f"{facts['step_s']} s, ")
+    text += f"{facts['threads']} thread{'' if facts['threads'] == '1' else 's'}.  "
     if facts["kind"] == "stability":
         return text + "Clean: converged and without an intersection, after every step"
     if facts["kind"] == "totals":
