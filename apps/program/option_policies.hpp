@@ -32,10 +32,11 @@ inline AnyStopping::Params stopping_of(SolverOptions const& options, int window)
                                  .window = asked > 0 ? asked : window};
 }
 
-/// `automatic`: what the word auto stands for.
+/// What the word rare stands for.
 inline Refresh rare_refresh(SolverOptions const& options) {
   return {.interval = options.integer("refresh_every"), .trigger = Refresh::rarely().trigger};
 }
+/// `automatic`: what the word auto stands for.
 inline Refresh refresh_of(SolverOptions const& options, Refresh const& automatic) {
   std::string const& when = options.text("refresh");
   if (when == "auto") return automatic;
