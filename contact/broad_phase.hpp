@@ -198,6 +198,8 @@ struct WriteVertices {
 
 /// Partners of a box that are kept until the lists have their places.
 inline constexpr int noted_partners = 32;
+/// Where those of asker a are.
+KOKKOS_INLINE_FUNCTION std::int64_t first_noted(int a) { return std::int64_t{noted_partners} * a; }
 
 /// Boxes that ask: those named, or if none is, the first `count`.
 template <class S>
@@ -227,7 +229,7 @@ struct FindPairs {
     int count[group] = {};
     KOKKOS_FUNCTION void operator()(int a, int j) {
       if (!find.pairing.accept(asker[a], j)) return;
-      if (count[a] < noted_partners) find.partner(noted_partners * (first + a) + count[a]) = j;
+      if (count[a] < noted_partners) find.partner(first_noted(first + a) + count[a]) = j;
       ++count[a];
     }
   };
@@ -295,7 +297,7 @@ private:
   KOKKOS_FUNCTION void write_noted(int a, std::int64_t first, int count) const {
     int partner[noted_partners], less[noted_partners] = {};
     for (int k = 0; k < noted_partners; ++k) {
-      partner[k] = k < count ? find.partner(noted_partners * a + k) : 0;
+      partner[k] = k < count ? find.partner(first_noted(a) + k) : 0;
     }
     for (int m = 0; m < count; ++m)
       for (int k = 0; k < noted_partners; ++k) less[k] += partner[m] < partner[k] ? 1 : 0;

@@ -16,6 +16,7 @@
 #include <taut/contact/contact_pairs.hpp>
 #include <taut/contact/contact_report.hpp>
 #include <taut/contact/lag_pairs.hpp>
+#include <taut/contact/start_gaps.hpp>
 #include <taut/contact/step_bound_sweep.hpp>
 #include <taut/core/potential/term.hpp>
 
@@ -61,6 +62,9 @@ public:
   struct Params {
     std::optional<double> dhat = {};  ///< m; else default_dhat (surface.hpp)
     double cap = 0.5;  ///< of the distance at rest, for pairs of one body (activation.hpp)
+    /// Of the gap that two bodies start with, below which they act; 0: below dhat, however close
+    /// they start (start_gaps.hpp).
+    double start_share = 0.9;
     Stiffness_ stiffness = {};
     double mollifier_threshold = EdgeMollifier::default_threshold;
     Bound_ bound = {};
@@ -79,17 +83,17 @@ public:
       : state_(std::make_shared<State>(unknowns, surface, rest, params)) {}
 
   double value(Positions const& x, double scale) const {
-    if (!state_->complete(x)) return 0;
+    if (!state_->may_act(x)) return 0;
     using Kernel = kernels::PairValue<Pair, Precision, Space>;
     return scale * state_->table.sum("contact_value", Kernel{pairs(), x});
   }
   double change(Positions const& x, Vectors const& p, double alpha, double scale) const {
-    if (!state_->complete(x, p, alpha)) return 0;
+    if (!state_->may_act(x, p, alpha)) return 0;
     using Kernel = kernels::PairChange<Pair, Precision, Space>;
     return scale * state_->table.sum("contact_change", Kernel{pairs(), x, p, alpha});
   }
   double quadratic_form(Positions const& x, Vectors const& p, double scale) const {
-    if (!state_->complete(x)) return 0;
+    if (!state_->may_act(x)) return 0;
     using Kernel = kernels::PairForm<Pair, Precision, Space>;
     return scale * state_->table.sum("contact_form", Kernel{pairs(), x, p, state_->table.known(x)});
   }
@@ -120,7 +124,7 @@ public:
 
   void add_product(Positions const& x, Vectors const& p, double scale, Fixed const& fixed,
                    Vectors const& hp) const {
-    if (!state_->complete(x)) return;
+    if (!state_->may_act(x)) return;
     using Kernel = kernels::PairProduct<Pair, Precision, Space>;
     auto const slots = state_->table.slots(0);
     for_each<Space>("contact_product", pairs().count, Kernel{pairs(), x, p, fixed, slots});
@@ -130,7 +134,7 @@ public:
   /// Throws Error, before it writes anything, if the matrix was made when other pairs were
   /// candidates and lacks a block that is not zero: then its pattern must be made anew.
   void add_to(Matrix const& matrix, Positions const& x, double scale, Fixed const& fixed) const {
-    if (!state_->complete(x)) return;
+    if (!state_->may_act(x)) return;
     state_->table.check_pattern(matrix, x, fixed);
     state_->table.assemble(matrix, x, scale, fixed);
   }
@@ -175,13 +179,14 @@ public:
   }
   /// Grows with each search; x brings the candidates up to date.
   std::int64_t pattern_version(Positions const& x) const {
-    state_->complete(x);
+    // Also where nothing acts yet: it may, before there is another search.
+    if (!state_->may_act(x)) state_->table.take(state_->near);
     return state_->near.counters().searches;
   }
 
   void add_form_shares(Positions const& x, Vectors const& p, double scale, Fixed const& fixed,
                        Array<double, Space> const& shares) const {
-    if (!state_->complete(x)) return;
+    if (!state_->may_act(x)) return;
     using Kernel = kernels::PairFormShares<Pair, Precision, Space>;
     state_->table.template add_form_shares<Kernel>(x, p, scale, fixed, shares);
   }
@@ -196,7 +201,7 @@ public:
   }
   void set_idle(IdleMask<Space> const& idle) const { state_->table.set_idle(idle); }
   void mark_acting(Positions const& x, Fixed const& fixed, Array<int, Space> const& marks) const {
-    if (!state_->complete(x)) return;
+    if (!state_->may_act(x)) return;
     using Kernel = kernels::MarkContacts<Precision, Space>;
     for_each<Space>("contact_marks", pairs().count, Kernel{{pairs(), x}, fixed, marks});
   }
@@ -204,12 +209,17 @@ public:
   /// For friction: appends all pairs that act at x, with mu by the objects of the surface.
   void lag(Positions const& x, kernels::FrictionMatrix<Space> const& mu,
            LaggedContacts<Precision, Space>& to) const {
-    if (!state_->complete(x)) return;
+    if (!state_->may_act(x)) return;
     using Kernel = kernels::LagPair<Pair, Precision, Space>;
     to.append("contact_lag", pairs().count, Kernel{pairs(), x, state_->surface.object, mu});
   }
 
   double dhat() const { return state_->activation.dhat; }
+  /// For checkpoints: what pairs of two bodies act below, per vertex of the mesh, m.
+  Array<double, Space> activation() const { return state_->activation.of_vertex; }
+  void set_activation(Array<double, Space> const& of_vertex) const {
+    state_->start_gaps.set(of_vertex);
+  }
   /// Searches, and the calls that did without: for energies and bounds of short motions, and for
   /// bounds of long ones.
   CacheCounters const& energy_counters() const { return state_->near.counters(); }
@@ -225,7 +235,7 @@ public:
   }
   ContactReport report(Positions const& x) const {
     ContactReport r;
-    if (!state_->complete(x)) return r;
+    if (!state_->may_act(x)) return r;
     r.candidates = pairs().count;
     r.contacts = state_->table.contacts(x);
     r.smallest_gap = state_->table.smallest_gap(x);
@@ -239,6 +249,7 @@ private:
     Fixed fixed;
     SurfaceViews<Space> surface;
     Activation<Space> activation;
+    StartGaps<Search_, Precision> start_gaps;
     Bound_ bound;
     Clearance clearance;
     static constexpr double growth = 4;  ///< of the portions of a motion
@@ -272,7 +283,10 @@ private:
       portion = edges.mean;
       size = box_diagonal(host, rest);
       activation = {params.dhat.value_or(default_dhat(host, rest)), params.cap,
-                    copy_points<Space>("contact_rest", rest), surface.object};
+                    copy_points<Space>("contact_rest", rest), surface.object,
+                    Array<double, Space>("contact_activation_of_vertex", rest.size())};
+      assign(activation.of_vertex, activation.dhat);
+      start_gaps = {surface, activation, params.start_share, edges.mean, params.search.search};
       clearance.ample = std::min(clearance.ample, activation.dhat);
       near = Cache(surface, edges.mean, activation, params.search);
       brief = std::max(portion, 2 * params.search.slack * activation.dhat);
@@ -285,7 +299,7 @@ private:
     }
 
     /// Makes the table complete for a motion by alpha p; false if nothing acts in it.
-    bool complete(Positions const& x, Vectors const& p = {}, double alpha = 0) {
+    bool may_act(Positions const& x, Vectors const& p = {}, double alpha = 0) {
       if (near.update({x, p, alpha, fixed, true}) == Touch::impossible) return false;
       table.take(near);
       return table.pairs().count > 0;
@@ -296,6 +310,7 @@ private:
       // restarted run go on bitwise.
       near.forget();
       swept.forget();
+      start_gaps.begin_step(start.x, fixed);
     }
 
     double max_step(Positions const& x, Vectors const& p, double at_most) {
@@ -366,7 +381,7 @@ private:
   template <int numbers, class CurvatureField>
   void gradient(Positions const& x, double scale, Fixed const& fixed, Vectors const& g,
                 CurvatureField const& c) const {
-    if (!state_->complete(x)) return;
+    if (!state_->may_act(x)) return;
     using Kernel = kernels::PairGradient<Pair, Precision, Space, numbers>;
     auto const slots = state_->table.slots(numbers);
     Kernel const kernel{{pairs(), x, {}, 0, slots}};
@@ -377,7 +392,7 @@ private:
   template <int numbers, class CurvatureField>
   double gradient_after(Positions const& x, Vectors const& p, double alpha, double scale,
                         Fixed const& fixed, Vectors const& g, CurvatureField const& c) const {
-    if (!state_->complete(x, p, -alpha)) return 0;
+    if (!state_->may_act(x, p, -alpha)) return 0;
     using Kernel = kernels::PairGradientAfter<Pair, Precision, Space, numbers>;
     auto const slots = state_->table.slots(numbers);
     Kernel const kernel{{pairs(), x, p, alpha, slots}};

@@ -38,10 +38,11 @@ struct LagFace {
     constexpr int most = decltype(table.faces)::most;
     int const i = item / most, f = item % most, v = table.vertex(i);
     if (f >= table.faces.count || !table.free(i)) return false;
-    double const dhat = table.fields.dhat;
+    double const activation = table.activation(i);
     FaceDistance const at = distance_to(table.faces.face[f], table.from_centre(i, x));
-    if (!(at.distance > 0 && at.distance < dhat)) return false;
-    double const press = -table.stiffness(i) * obstacle_barrier<Barrier>(at.distance, dhat).slope;
+    if (!(at.distance > 0 && at.distance < activation)) return false;
+    double const press =
+        -table.stiffness(i) * obstacle_barrier<Barrier>(at.distance, activation).slope;
     Vec3<double> const motion = carry({double(x(v, 0)), double(x(v, 1)), double(x(v, 2))});
     to.vertex[0] = v;
     to.c[0] = Real(1);

@@ -17,6 +17,7 @@
 #include <taut/contact/adaptive_stiffness.hpp>
 #include <taut/contact/lag_obstacle.hpp>
 #include <taut/contact/obstacle_kernels.hpp>
+#include <taut/contact/start_gaps.hpp>
 #include <taut/core/exec/copy.hpp>
 
 #include <algorithm>
@@ -88,6 +89,7 @@ public:
 
   struct Params {
     std::optional<double> dhat = {};  ///< m; else default_dhat (surface.hpp)
+    double start_share = 0.9;         ///< as in Contact
     Stiffness_ stiffness = {};
     Clearance clearance = {.share = 0.45};  ///< as in Contact
   };
@@ -188,6 +190,7 @@ public:
   void begin_step(StepStart<Precision, Space> const& start) const {
     state_->take_stiffness(start.stiffness);
     state_->enter(start.x);
+    state_->look_at_gaps(start.x);
     FaceMotion const& motion = state_->track.motion();
     state_->carry = {turn_matrix(motion.turn), motion.along, state_->table.faces.origin};
     if constexpr (AdaptiveRule<Stiffness_>) {
@@ -232,11 +235,16 @@ public:
 
   Shape const& shape() const { return state_->shape; }
   double dhat() const { return state_->table.fields.dhat; }
+  /// For checkpoints: below what each vertex of the surface is acted on, m.
+  Array<double, Space> activation() const { return state_->table.activation; }
+  void set_activation(Array<double, Space> const& of_vertex) const {
+    state_->set_activation(of_vertex);
+  }
   ObstacleReport report(Positions const& x) const {
     using Forces = kernels::SumObstacleForces<Barrier, Table>;
     auto const total = sum<4>("obstacle_forces", Forces{table(), x});
     using Gap = kernels::LeastObstacleGap<Table>;
-    double const gap = minimum<Space>("obstacle_gap", vertices(), 1.0, Gap{table(), x});
+    double const gap = minimum<Space>("obstacle_gap", vertices(), 1.0, Gap{{table(), x}});
     return {static_cast<int>(total[3]), gap, {total[0], total[1], total[2]}};
   }
   /// How many fixed vertices the obstacle holds (see begin_step).
@@ -258,6 +266,9 @@ private:
     ObstacleCarry carry;                           ///< in the step that has begun
     typename SurfaceViews<Space>::Indices object;  ///< per vertex of the mesh
     bool anew = true;  ///< nothing is known yet of what the obstacle holds
+    double start_share;
+    bool starts_short = start_share > 0;  ///< some vertex may be acted on from below dhat only
+    bool first = true;                    ///< no step has begun
     std::optional<LimitingVertex> limiting;
     double size;  ///< the diagonal of the box around the surface at rest, m
     Reducer<Space, double> reducer;
@@ -265,7 +276,10 @@ private:
     State(Unknowns<Precision, Space> const& unknowns, Surface const& host,
           std::vector<Point> const& rest, Shape const& given, Params const& params,
           RigidPose const& pose)
-        : shape(given), clearance(params.clearance), track(given.centre()) {
+        : shape(given),
+          clearance(params.clearance),
+          track(given.centre()),
+          start_share(params.start_share) {
       if (rest.size() != host.object.size() || rest.size() != std::size_t(unknowns.size())) {
         throw Error(
             "obstacle: {} positions at rest, a surface over {} vertices and {} unknowns: give as "
@@ -283,6 +297,8 @@ private:
       table.vertex = to_space<Space>("obstacle_vertex", host.vertices);
       object = to_space<Space>("obstacle_object", host.object);
       table.held = Fixed("obstacle_held", host.vertices.size());
+      table.activation = Array<double, Space>("obstacle_activation", host.vertices.size());
+      assign(table.activation, dhat);
       table.rule = params.stiffness;
       table.fields = {area_of(host, rest), {}, unknowns.fixed, dhat};
       reducer = Reducer<Space, double>(vertices(), 4);
@@ -295,6 +311,12 @@ private:
       if (!params.stiffness.valid()) {
         throw Error("obstacle: the stiffness rule '{}' needs a positive stiffness (stiffness.hpp)",
                     Stiffness_::name);
+      }
+      if (!(params.start_share >= 0 && params.start_share < 1)) {
+        throw Error(
+            "obstacle: a face that acts below {} of the gap a vertex starts with: give a share "
+            "from 0 on and below 1",
+            params.start_share);
       }
       kernels::check_clearance(params.clearance, 1);
       shape.check();
@@ -352,6 +374,20 @@ private:
                               {Kokkos::Experimental::infinity_v<double>}, table, x, anew});
       if (!(worst.alpha > 0)) refuse(vertex_of(worst), x);
       anew = false;
+    }
+    /// What starts closer than dhat is acted on from closer (start_gaps.hpp).
+    void look_at_gaps(Positions const& x) {
+      if (!starts_short) return;
+      kernels::RaiseActivation<kernels::FaceGap<Table>, Space> const raise{
+          {table, x}, table.activation, table.fields.dhat, start_share, first};
+      starts_short = maximum<Space>("obstacle_start_gaps", vertices(), 0, raise) > 0;
+      first = false;
+    }
+    void set_activation(Array<double, Space> const& of_vertex) {
+      if (start_share == 0) return;
+      assign(table.activation, of_vertex);
+      first = false;
+      starts_short = true;  // the next step finds out
     }
     [[noreturn]] void refuse(LimitingVertex const& at, Positions const& x) const {
       auto const host = Kokkos::create_mirror_view_and_copy(Kokkos::HostSpace(), x);

@@ -23,7 +23,7 @@
 
 namespace taut::kernels {
 
-/// What all sweeps read. `fields.dhat` is the distance below which a face acts.
+/// What all sweeps read.
 template <int n, class Rule, class Precision, class S>
 struct ObstacleTable {
   using Position = typename Precision::position;
@@ -32,7 +32,8 @@ struct ObstacleTable {
   using Vectors = VectorField<Real, S>;
 
   typename SurfaceViews<S>::Indices vertex;
-  FixedMask<S> held;  ///< per surface vertex: 1 for what is fixed within the obstacle
+  FixedMask<S> held;            ///< per surface vertex: 1 for what is fixed within the obstacle
+  Array<double, S> activation;  ///< per surface vertex: the distance below which a face acts, m
   Rule rule;
   StiffnessFields<Precision, S> fields;
   PlacedFaces<n> faces;
@@ -125,10 +126,11 @@ KOKKOS_INLINE_FUNCTION ObstacleForce obstacle_force(Table const& table, int i,
                                                     bool with_hessian) {
   ObstacleForce r;
   Vec3<double> const w = table.from_centre(i, x);
+  double const activation = table.activation(i);
   for (int f = 0; f < table.faces.count; ++f) {
     FaceDistance const at = distance_to(table.faces.face[f], w);
-    if (!(at.distance < table.fields.dhat)) continue;
-    auto const b = obstacle_barrier<Barrier>(at.distance, table.fields.dhat);
+    if (!(at.distance < activation)) continue;
+    auto const b = obstacle_barrier<Barrier>(at.distance, activation);
     r.gradient = r.gradient + b.slope * at.n;
     ++r.contacts;
     if (!with_hessian) continue;
@@ -149,10 +151,11 @@ struct ObstacleValue {
   [[gnu::noinline]] KOKKOS_FUNCTION double value(int i) const {
     if (!table.free(i)) return 0;
     Vec3<double> const w = table.from_centre(i, x);
+    double const activation = table.activation(i);
     double sum = 0;
     for (int f = 0; f < table.faces.count; ++f) {
       double const d = distance_to(table.faces.face[f], w).distance;
-      if (d < table.fields.dhat) sum += obstacle_barrier<Barrier>(d, table.fields.dhat).value;
+      if (d < activation) sum += obstacle_barrier<Barrier>(d, activation).value;
     }
     return sum == 0 ? 0 : table.stiffness(i) * sum;
   }
@@ -173,7 +176,7 @@ struct ObstacleChange {
     Vec3<double> const w = arrived ? table.from_centre(i, x) - s : table.from_centre(i, x);
     double sum = 0;
     for (int f = 0; f < table.faces.count; ++f) {
-      sum += obstacle_change<Barrier>(table.faces.face[f], w, s, table.fields.dhat);
+      sum += obstacle_change<Barrier>(table.faces.face[f], w, s, table.activation(i));
     }
     return sum == 0 ? 0 : table.stiffness(i) * sum;
   }
@@ -302,22 +305,27 @@ struct SumObstacleForces {
   }
 };
 
-/// Lowers to the share that is left of dhat.
+/// How far surface vertex i is from the nearest face, m.
 template <class Table>
-struct LeastObstacleGap {
+struct FaceGap {
   Table table;
   typename Table::Positions x;
-  [[gnu::noinline]] KOKKOS_FUNCTION double gap(int i) const {
-    double least = Kokkos::Experimental::infinity_v<double>;
-    if (!table.free(i)) return least;
+  [[gnu::noinline]] KOKKOS_FUNCTION double operator()(int i) const {
     Vec3<double> const w = table.from_centre(i, x);
+    double least = Kokkos::Experimental::infinity_v<double>;
     for (int f = 0; f < table.faces.count; ++f) {
       least = Kokkos::min(least, distance_to(table.faces.face[f], w).distance);
     }
-    return least / table.fields.dhat;
+    return least;
   }
+};
+
+/// Lowers to the share that is left of the distance below which a vertex is acted on.
+template <class Table>
+struct LeastObstacleGap {
+  FaceGap<Table> gap;
   KOKKOS_FUNCTION void operator()(int i, double& least) const {
-    least = Kokkos::min(least, gap(i));
+    if (gap.table.free(i)) least = Kokkos::min(least, gap(i) / gap.table.activation(i));
   }
 };
 

@@ -19,6 +19,9 @@ public:
   virtual ~ProgramContact() = default;
   virtual ContactReport report(VectorField<typename P::position, DefaultSpace> const& x) const = 0;
   virtual double dhat() const = 0;  ///< m
+  /// Below what two bodies act, per vertex, m: part of a checkpoint.
+  virtual Array<double, DefaultSpace> activation() const = 0;
+  virtual void set_activation(Array<double, DefaultSpace> const& activation) const = 0;
   /// Its pairs have friction; the coefficients are by the objects of the surface.
   virtual void add_to(Friction<P>& friction, FrictionCoefficients const& mu) const = 0;
 };

@@ -23,6 +23,10 @@ std::shared_ptr<ProgramContact<P> const> add_contact_of(AnySteppedTerms<P>& term
       return term.report(x);
     }
     double dhat() const override { return term.dhat(); }
+    Array<double, DefaultSpace> activation() const override { return term.activation(); }
+    void set_activation(Array<double, DefaultSpace> const& a) const override {
+      term.set_activation(a);
+    }
     void add_to(Friction<P>& friction, FrictionCoefficients const& mu) const override {
       friction.add(term, mu);
     }
@@ -30,6 +34,7 @@ std::shared_ptr<ProgramContact<P> const> add_contact_of(AnySteppedTerms<P>& term
   typename Term::Params params;
   params.dhat = part.dhat;
   params.cap = options.number("cap");
+  params.start_share = options.number("start_share");
   params.stiffness = AnyStiffness(options);
   if constexpr (std::same_as<Bound, HalfDhatClamp>) {
     params.bound.dhat = part.dhat;

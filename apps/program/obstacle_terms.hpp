@@ -19,6 +19,9 @@ public:
   virtual void place(RigidMap const& pose) const = 0;
   virtual RigidMap pose() const = 0;
   virtual ContactReport report(VectorField<typename P::position, DefaultSpace> const& x) const = 0;
+  /// As ProgramContact::activation, per vertex of the surface.
+  virtual Array<double, DefaultSpace> activation() const = 0;
+  virtual void set_activation(Array<double, DefaultSpace> const& activation) const = 0;
   /// Bodies rub on it with this coefficient.
   virtual void add_to(Friction<P>& friction, double mu) const = 0;
   /// How far a point is inside, m: not above 0 if it is not.

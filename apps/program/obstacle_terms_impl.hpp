@@ -49,6 +49,10 @@ public:
     ObstacleReport const r = term_.report(x);
     return {.candidates = 0, .contacts = r.contacts, .smallest_gap = r.smallest_gap};
   }
+  Array<double, DefaultSpace> activation() const override { return term_.activation(); }
+  void set_activation(Array<double, DefaultSpace> const& a) const override {
+    term_.set_activation(a);
+  }
   void add_to(Friction<P>& friction, double mu) const override { friction.add(term_, mu); }
   double depth(Point const& x) const override {
     auto const faces = taut::place(term_.shape(), term_.pose());
@@ -71,7 +75,9 @@ std::shared_ptr<ProgramObstacle<P> const> add_obstacle_term(AnySteppedTerms<P>& 
   return ToShape::with(obstacle, [&]<class Shape>(Shape const& shape) {
     using Term = typename ObstacleHandle<P, Shape>::Term;
     Term const term(part.unknowns, part.surface, part.rest, shape,
-                    {.dhat = part.dhat, .stiffness = AnyStiffness(options)},
+                    {.dhat = part.dhat,
+                     .start_share = options.number("start_share"),
+                     .stiffness = AnyStiffness(options)},
                     to_pose(obstacle.placement));
     terms.add(term);
     return std::shared_ptr<ProgramObstacle<P> const>(

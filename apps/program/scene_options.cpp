@@ -170,6 +170,13 @@ std::span<OptionKey const> contact_keys() {
        {.min = 0, .max = 1, .open_min = true, .open_max = true},
        {},
        "of its distance at rest: no pair of one body acts from further away"},
+      {"start_share",
+       0.9,
+       {.min = 0, .max = 1, .open_max = true},
+       {},
+       "of the gap that they start with: two bodies, or one and an obstacle, act from no further "
+       "away until they have been further apart; 0: from dhat, so that what starts closer is "
+       "pushed apart"},
       {"stiffness",
        std::string("elastic_inclusive"),
        {},
@@ -205,7 +212,9 @@ std::span<OptionKey const> contact_keys() {
        std::string("log"),
        {},
        {"log", "ipc", "log_squared", "cubic"},
-       "energy over distance; all but log in fp64 alone"},
+       "energy over distance of a pair; all but log in fp64 alone. Obstacles that are formulas "
+       "keep "
+       "log"},
       {"curvature",
        std::string("gauss_newton"),
        {},

@@ -104,6 +104,12 @@ public:
     checkpoint.set("steps", std::vector<std::int32_t>{state_.steps});
     for (auto const& [name, field] : fields()) checkpoint.set(name, flat(field));
     if (sleep().on) checkpoint.set("quiet_steps", quiet_);
+    if (contact_) {
+      save_field(checkpoint, "contact_activation", contact_->activation());
+      for (std::size_t k = 0; k < formulas_.size(); ++k) {
+        if (formulas_[k]) save_field(checkpoint, activation_name(k), formulas_[k]->activation());
+      }
+    }
     std::vector<double> numbers;
     for (RigidMap const& pose : poses()) {
       for (Point const& row : pose.rotation) numbers.insert(numbers.end(), row.begin(), row.end());
@@ -132,6 +138,15 @@ public:
       euler_.sleep().set_quiet(quiet_);
       bdf2_.sleep().set_quiet(quiet_);
     }
+    if (contact_) {
+      contact_->set_activation(
+          restored_field(checkpoint, "contact_activation", contact_->activation()));
+      for (std::size_t k = 0; k < formulas_.size(); ++k) {
+        if (!formulas_[k]) continue;
+        formulas_[k]->set_activation(
+            restored_field(checkpoint, activation_name(k), formulas_[k]->activation()));
+      }
+    }
     std::vector<RigidMap> read_poses = poses();
     if (read_poses.empty()) return;
     auto const& numbers = checkpoint.get<double>("obstacle_poses");
@@ -148,6 +163,25 @@ public:
   }
 
 private:
+  using Lengths = Array<double, DefaultSpace>;
+  static std::string activation_name(std::size_t obstacle) {
+    return fmt::format("obstacle_{}_activation", obstacle);
+  }
+  static void save_field(Checkpoint& checkpoint, std::string const& name, Lengths const& field) {
+    auto const host = Kokkos::create_mirror_view_and_copy(Kokkos::HostSpace(), field);
+    checkpoint.set(name, std::vector<double>(host.data(), host.data() + host.extent(0)));
+  }
+  /// One that is as long as `like`.
+  static Lengths restored_field(Checkpoint const& checkpoint, std::string const& name,
+                                Lengths const& like) {
+    auto const& numbers = checkpoint.get<double>(name);
+    if (numbers.size() != like.extent(0)) {
+      throw Error("the checkpoint holds {} numbers as {}, the scene needs {}; start the run again",
+                  numbers.size(), name, like.extent(0));
+    }
+    return to_space<DefaultSpace>("restored", numbers);
+  }
+
   /// Of bodies and of the surfaces of obstacles.
   int size() const { return static_cast<int>(mesh_.points.size()); }
 

@@ -49,7 +49,7 @@ struct Fixture {
       : scene(s),
         unknowns(std::vector<double>(s.x.size(), 1), 0.5),
         contact(unknowns, s.surface, s.rest,
-                {.dhat = Squashed::dhat, .stiffness = {.pressure = pressure}}),
+                {.dhat = Squashed::dhat, .start_share = 0, .stiffness = {.pressure = pressure}}),
         x(soups::to_field<typename Precision::position, S>(s.x)),
         p(soups::to_field<Real, S>(s.p)),
         g("g", s.size()),
@@ -236,6 +236,32 @@ TEST_CASE("a matrix made for other candidates is refused before it is written to
   CHECK(potential.pattern_version(f.x) != version);
   auto const anew = potential.pattern(f.x);
   CHECK_NOTHROW(f.contact.add_to(anew, f.x, 1, f.unknowns.fixed));
+}
+
+TEST_CASE("a matrix holds for what comes to act before there is another search", "[contact]") {
+  Fixture<Fp64> f;
+  auto const at = [&](double up) {
+    std::vector<Point> x = f.scene.rest;
+    for (std::size_t v = 0; v < x.size(); ++v) {
+      if (f.scene.surface.object[v] == 1) x[v][1] += up;
+    }
+    return soups::to_field<double, DefaultSpace>(x);
+  };
+  // Where the cubes are just out of reach of each other.
+  double acts = 0, free = 1;
+  while (free - acts > 1e-3 * Squashed::dhat) {
+    double const middle = 0.5 * (acts + free);
+    (f.contact.report(at(middle)).contacts > 0 ? acts : free) = middle;
+  }
+  Potential potential(f.unknowns, f.contact);
+  auto const apart = at(free + 0.005 * Squashed::dhat), close = at(acts - 0.01 * Squashed::dhat);
+  potential.begin_step(apart, 1, 1, false);
+  auto const version = potential.pattern_version(apart);
+  auto const matrix = potential.pattern(apart);
+  CHECK(f.contact.report(apart).contacts == 0);
+  REQUIRE(f.contact.report(close).contacts > 0);
+  REQUIRE(potential.pattern_version(close) == version);
+  CHECK_NOTHROW(potential.assemble(close, matrix));
 }
 
 TEMPLATE_TEST_CASE("contact exerts no force and no moment in all", "[contact]", Fp64, Mixed) {

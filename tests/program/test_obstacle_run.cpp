@@ -130,3 +130,71 @@ TEST_CASE("a body that starts beyond a half space is refused, naming both", "[ob
       MessageMatches(ContainsSubstring("of object cube") && ContainsSubstring("obstacle floor") &&
                      ContainsSubstring("obstacle.NAME.translate")));
 }
+
+namespace {
+
+/// Two cubes on the ground, 0.1 mm apart, as one puts things down.
+std::string const put_down = R"(name = "put_down"
+gravity = [0, -9.81, 0]
+
+[time]
+step = 1e-3
+frames = 40
+
+[[object]]
+name = "lower"
+shape = { kind = "box", size = [0.2, 0.2, 0.2], resolution = 2 }
+translate = [0, 0.1001, 0]
+material = { young = 1e6, poisson = 0.4, density = 1000 }
+
+[[object]]
+name = "upper"
+shape = { kind = "box", size = [0.2, 0.2, 0.2], resolution = 2 }
+translate = [0.03, 0.3002, 0]
+material = { young = 1e6, poisson = 0.4, density = 1000 }
+
+[[obstacle]]
+name = "floor"
+shape = { kind = "half_space" }
+
+[contact]
+)";
+
+double fastest(ResultReader const& result) {
+  double fastest = 0;
+  for (Point const& v : result.velocities(result.frames() - 1)) {
+    fastest = std::max(fastest, std::hypot(v[0], v[1], v[2]));
+  }
+  return fastest;
+}
+
+}  // namespace
+
+TEST_CASE("what is put down closer than dhat stays there", "[obstacle]") {
+  SceneRun run("scene.toml", put_down, {}, CheckRun::every_step);
+  CHECK(run_command(run.options) == 0);
+  CHECK(run.summary().at("steps_converged") == 40);
+  ResultReader const result = run.result();
+  // Soft cubes sag by less than a millimetre; nothing is thrown, and no gap closes or opens.
+  CHECK(fastest(result) < 0.03);
+  auto const first = result.positions(0), last = result.positions(result.frames() - 1);
+  for (std::size_t v = 0; v < first.size(); ++v) {
+    CHECK(std::abs(last[v][1] - first[v][1]) < 1e-3);
+  }
+  SceneRun thrown("scene.toml", put_down, {"contact.start_share=0"});
+  CHECK(run_command(thrown.options) == 0);
+  CHECK(fastest(thrown.result()) > 0.3);
+}
+
+TEST_CASE("what was put down goes on bitwise after a restart", "[obstacle]") {
+  SceneRun whole("scene.toml", put_down), parts("scene.toml", put_down, {"time.frames=15"});
+  CHECK(run_command(whole.options) == 0);
+  CHECK(run_command(parts.options) == 0);
+  parts.options.restart = true;
+  parts.options.scene.changes.overrides = {};
+  CHECK(run_command(parts.options) == 0);
+  ResultReader const one = whole.result(), other = parts.result();
+  REQUIRE(one.frames() == other.frames());
+  CHECK(one.positions(one.frames() - 1) == other.positions(one.frames() - 1));
+  CHECK(one.velocities(one.frames() - 1) == other.velocities(one.frames() - 1));
+}
