@@ -31,20 +31,23 @@
 
 namespace taut {
 
-/// Closed: boxes that share a point of their surface overlap.
+/// Closed: boxes that share a point of their surface overlap. But two whose contents are held by
+/// one mark never move against each other and are of no interest: they count as apart, so that a
+/// search passes over what is inside of an obstacle.
 struct SearchBox {
   float low[3], high[3];
+  int held = 0;  ///< the mark by which all in it is fixed (Motion::mark); 0: not all, or by several
 };
 
 /// Overlaps no bounded box, and leaves every box that it is joined to as it is.
 KOKKOS_INLINE_FUNCTION SearchBox empty_box() {
   constexpr float infinity = Kokkos::Experimental::infinity_v<float>;
-  return {{infinity, infinity, infinity}, {-infinity, -infinity, -infinity}};
+  return {{infinity, infinity, infinity}, {-infinity, -infinity, -infinity}, -1};
 }
 
 KOKKOS_FORCEINLINE_FUNCTION bool overlap(SearchBox const& a, SearchBox const& b) {
   // Without branches: which side is the first to fail is anyone's guess.
-  unsigned all = 1;
+  unsigned all = static_cast<unsigned>(a.held == 0) | static_cast<unsigned>(a.held != b.held);
   for (int c = 0; c < 3; ++c) {
     all &=
         static_cast<unsigned>(a.low[c] <= b.high[c]) & static_cast<unsigned>(b.low[c] <= a.high[c]);
@@ -58,6 +61,8 @@ KOKKOS_FORCEINLINE_FUNCTION SearchBox join(SearchBox const& a, SearchBox const& 
     r.low[c] = Kokkos::min(a.low[c], b.low[c]);
     r.high[c] = Kokkos::max(a.high[c], b.high[c]);
   }
+  // What is empty has -1.
+  r.held = a.held < 0 ? b.held : b.held < 0 || b.held == a.held ? a.held : 0;
   return r;
 }
 
@@ -159,6 +164,11 @@ struct Motion {
   bool between_fixed = false;
 
   KOKKOS_FUNCTION bool moves() const { return p.extent(0) > 0; }
+  /// Vertices of one mark, but 0, make no pairs of interest.
+  KOKKOS_FUNCTION int mark(int v) const {
+    if (fixed.extent(0) == 0 || fixed(v) == 0) return 0;
+    return between_fixed ? fixed(v) : 1;
+  }
   KOKKOS_FUNCTION Vec3<double> start(int v) const {
     return {double(x(v, 0)), double(x(v, 1)), double(x(v, 2))};
   }
@@ -224,6 +234,7 @@ struct VertexBoxes {
       box.low[c] = round_down(Kokkos::min(a, b) - grow);
       box.high[c] = round_up(Kokkos::max(a, b) + grow);
     }
+    box.held = motion.mark(v);
     of_vertex(v) = box;
   }
 };

@@ -55,17 +55,19 @@ struct CurvePlaces {
 
 inline constexpr SizeClass no_class = smallest_class - 1;
 
-/// Eight boxes, bound by bound, and the largest size class of what is in each.
+/// Eight boxes, bound by bound, with the largest size class of what is in each.
 struct BoxBundle {
   static constexpr int size = 8;
   float low[3][size], high[3][size];
   SizeClass largest[size];
+  int held[size];
 
   /// Bit b is set if box b overlaps `query` and holds something of the class `least` or above.
   KOKKOS_FORCEINLINE_FUNCTION unsigned overlapping(SearchBox const& query, SizeClass least) const {
     int bit[size];
+    int const held_alike = query.held > 0 ? query.held : -2;  // which none is
     for (int b = 0; b < size; ++b) {
-      int here = static_cast<int>(largest[b] >= least);
+      int here = static_cast<int>(largest[b] >= least) & static_cast<int>(held[b] != held_alike);
       for (int c = 0; c < 3; ++c) {
         here &= static_cast<int>(low[c][b] <= query.high[c]) &
                 static_cast<int>(query.low[c] <= high[c][b]);
@@ -82,9 +84,10 @@ struct BoxBundle {
       high[c][b] = box.high[c];
     }
     largest[b] = largest_in_it;
+    held[b] = box.held;
   }
   KOKKOS_FUNCTION SearchBox box(int b) const {
-    return {{low[0][b], low[1][b], low[2][b]}, {high[0][b], high[1][b], high[2][b]}};
+    return {{low[0][b], low[1][b], low[2][b]}, {high[0][b], high[1][b], high[2][b]}, held[b]};
   }
   /// Around all of them.
   KOKKOS_FUNCTION SearchBox all() const {

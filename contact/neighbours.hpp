@@ -263,7 +263,10 @@ private:
   /// Boxes around the anchors.
   void compute_boxes(kernels::WithinReach<Precision, Space> const& near) {
     double const reach = std::max(reach_.within, reach_.between);
-    boxes_.compute(anchors_.motion(), near.activation.dhat + reach, anchors_.radius);
+    Motion<Fp64, Space> at_anchors = anchors_.motion();
+    at_anchors.fixed = near.motion.fixed;
+    at_anchors.between_fixed = near.motion.between_fixed;
+    boxes_.compute(at_anchors, near.activation.dhat + reach, anchors_.radius);
     triangles_.build(boxes_.triangles());
     edges_.build(boxes_.edges());
   }

@@ -10,6 +10,7 @@
 
 #include <catch2/catch_template_test_macros.hpp>
 #include <catch2/catch_test_macros.hpp>
+#include <catch2/generators/catch_generators.hpp>
 #include <catch2/matchers/catch_matchers_string.hpp>
 
 #include <algorithm>
@@ -266,6 +267,35 @@ TEST_CASE("pairs whose vertices are all fixed are left out, and no others", "[co
   HostCandidates const expected{leave_free(all.point_triangle), leave_free(all.edge_edge)};
   CHECK(expected.edge_edge.size() < all.edge_edge.size());
   CHECK(expected.point_triangle.size() < all.point_triangle.size());
+  CHECK((find<SpatialHash<S>>(soup, motion) == expected));
+  CHECK((find<Bvh<S>>(soup, motion) == expected));
+}
+
+TEST_CASE("pairs that are held by one mark are left out, and no others", "[contact]") {
+  using S = DefaultSpace;
+  bool const between_fixed = GENERATE(false, true);
+  int const run = GENERATE(3, 40);  // vertices of one mark that follow each other
+  CAPTURE(between_fixed, run);
+  Soup const soup = make_soup(Kind::strip, 1, 200);
+  auto motion = motion_of<Fp64, S>(soup, 0.01);
+  HostCandidates const all = find<BruteForce<S>>(soup, motion);
+  motion.fixed = FixedMask<S>("fixed", soup.x.size());
+  motion.between_fixed = between_fixed;
+  std::vector<int> mark(soup.x.size());
+  auto const host = Kokkos::create_mirror_view(motion.fixed);
+  for (std::size_t v = 0; v < mark.size(); ++v) host(v) = mark[v] = int(v) / run % 4;
+  assign(motion.fixed, host);
+  auto const leave_free = [&](std::vector<std::array<int, 4>> pairs) {
+    std::erase_if(pairs, [&](auto const& p) {
+      return std::all_of(p.begin(), p.end(), [&](int v) {
+        return mark[v] != 0 && (!between_fixed || mark[v] == mark[p[0]]);
+      });
+    });
+    return pairs;
+  };
+  HostCandidates const expected{leave_free(all.point_triangle), leave_free(all.edge_edge)};
+  CHECK(expected.edge_edge.size() < all.edge_edge.size());
+  CHECK((find<BruteForce<S>>(soup, motion) == expected));
   CHECK((find<SpatialHash<S>>(soup, motion) == expected));
   CHECK((find<Bvh<S>>(soup, motion) == expected));
 }
