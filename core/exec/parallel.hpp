@@ -40,19 +40,38 @@ void for_each(char const* name, int n, Functor const& functor) {
   }
 }
 
+namespace kernels {
+
+/// Where `bytes` for a team go if its fastest memory holds `fastest` of them: level 1 is larger.
+constexpr int scratch_level(std::size_t bytes, std::size_t fastest) {
+  return bytes <= fastest ? 0 : 1;
+}
+
+}  // namespace kernels
+
 /// Calls `functor(team)` for `teams` teams of `team_size` threads, each with `scratch` bytes of its
-/// own (level 0).
+/// own: at level 0, or on a device where that is too small and the functor has a `scratch_level`
+/// that can tell it so, at level 1.
 template <class S, class Functor>
 void for_each_team(char const* name, int teams, int team_size, std::size_t scratch,
                    Functor const& functor) {
   if (teams == 0) return;
   typename S::team_policy policy(S::instance(), teams, team_size);
-  if (scratch > 0) policy.set_scratch_size(0, Kokkos::PerTeam(static_cast<int>(scratch)));
+  auto const provide = [&](int level) {
+    if (scratch > 0) policy.set_scratch_size(level, Kokkos::PerTeam(static_cast<int>(scratch)));
+  };
   if constexpr (S::on_host) {
     using Execution = typename S::execution;
+    provide(0);
     kernels::host_team_loop<Execution>(policy, label(name), kernels::run_team<Execution, Functor>,
                                        &functor);
+  } else if constexpr (requires(Functor f) { f.scratch_level = 0; }) {
+    Functor placed = functor;
+    placed.scratch_level = kernels::scratch_level(scratch, policy.scratch_size_max(0));
+    provide(placed.scratch_level);
+    Kokkos::parallel_for(label(name), policy, placed);
   } else {
+    provide(0);
     Kokkos::parallel_for(label(name), policy, functor);
   }
 }

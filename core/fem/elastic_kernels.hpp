@@ -79,9 +79,9 @@ struct GradientSweep : PatchSweep<S, typename Precision::real> {
       if (after_step) Kokkos::single(Kokkos::PerTeam(team), [&]() { change(patch) = 0; });
       return;
     }
-    ScratchField<S, Real> const local(team.team_scratch(0), this->row_numbers());
-    ScratchField<S, Real> const slots(team.team_scratch(0), this->slot_numbers(numbers()));
-    ScratchField<S, Real> const energies(team.team_scratch(0), this->element_numbers());
+    auto const local = this->room(team, this->row_numbers());
+    auto const slots = this->room(team, this->slot_numbers(numbers()));
+    auto const energies = this->room(team, this->element_numbers());
     this->load_relative(team, patch, x, 0, local);
     if (after_step) this->load_relative(team, patch, p, 1, local);
     if (curvature == Curvature::none) {
@@ -152,8 +152,8 @@ struct ProductSweep : PatchSweep<S, typename Precision::real> {
   KOKKOS_FUNCTION void operator()(typename S::team_member const& team) const {
     int const patch = team.league_rank();
     auto const& v = this->patches;
-    ScratchField<S, Real> const local(team.team_scratch(0), this->row_numbers());
-    ScratchField<S, Real> const slots(team.team_scratch(0), this->slot_numbers(3));
+    auto const local = this->room(team, this->row_numbers());
+    auto const slots = this->room(team, this->slot_numbers(3));
     this->load_relative(team, patch, x, 0, local);
     this->load_relative(team, patch, p, 1, local);
     this->template clear<3>(team, patch, slots);
@@ -218,8 +218,8 @@ struct MeasureSweep : PatchSweep<S, typename Precision::real> {
       });
       return;
     }
-    ScratchField<S, Real> const local(team.team_scratch(0), this->row_numbers());
-    ScratchField<S, Real> const energies(team.team_scratch(0), this->element_numbers());
+    auto const local = this->room(team, this->row_numbers());
+    auto const energies = this->room(team, this->element_numbers());
     [[maybe_unused]] Real largest_x = 0, largest_p = 0;
     largest_x = this->template load_relative<certifies>(team, patch, x, 0, local);
     if constexpr (measure != Measure::energy)

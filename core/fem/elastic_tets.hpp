@@ -11,14 +11,22 @@
 
 #include <algorithm>
 #include <limits>
+#include <optional>
 
 namespace taut {
 
 /// How the sweeps are cut up. The result of a sweep depends on patch_size alone.
 struct SweepParams {
-  int patch_size = 512;  ///< tets per patch, at most 4096
-  int team_size = 0;     ///< threads per patch; 0: one on the host, 128 on a device
+  std::optional<int> patch_size;  ///< tets per patch, at most 4096; none: default_patch_size
+  int team_size = 0;              ///< threads per patch; 0: one on the host, 128 on a device
 };
+
+/// On a device, so many that the fast memory of a team holds what the usual sweeps need.
+template <class Space, class Real>
+constexpr int default_patch_size() {
+  return Space::on_host ? 512
+                        : kernels::device_patch_size(PatchViews<Space, Real>::lanes, sizeof(Real));
+}
 
 template <ElementMaterial Material, class Precision_ = Mixed, class Space_ = DefaultSpace>
 class ElasticTets {
@@ -190,8 +198,9 @@ ElasticTets<Material, Precision, Space>::ElasticTets(
         throw Error("ElasticTets: tet {} has vertex {} of {}", t, v, rest.points.size());
     }
   }
-  Patches const host = make_patches(rest.tets, material_of_tet,
-                                    static_cast<int>(rest.points.size()), lanes, params.patch_size);
+  Patches const host =
+      make_patches(rest.tets, material_of_tet, static_cast<int>(rest.points.size()), lanes,
+                   params.patch_size.value_or(default_patch_size<Space, Real>()));
   std::vector<double> shapes(10 * host.tet.size());
   for (std::size_t e = 0; e < host.tet.size(); ++e) {
     RestShape const shape = rest_shape(rest.points, rest.tets[host.tet[e]]);

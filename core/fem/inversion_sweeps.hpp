@@ -119,7 +119,7 @@ struct InversionSweep : PatchSweep<S, typename Precision::real> {
   KOKKOS_FUNCTION void operator()(typename S::team_member const& team) const {
     int const patch = team.league_rank();
     auto const& v = this->patches;
-    ScratchField<S, Real> const local(team.team_scratch(0), this->row_numbers());
+    auto const local = this->room(team, this->row_numbers());
     Real const largest_x = this->template load_relative<true>(team, patch, x, 0, local);
     Real const largest_p = this->template load_relative<true>(team, patch, p, 1, local);
     team.team_barrier();

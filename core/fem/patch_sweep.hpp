@@ -17,6 +17,61 @@ using ScratchField = Kokkos::View<Real*, typename S::execution::scratch_memory_s
 /// Numbers in the rows of four that hold `numbers`.
 KOKKOS_FORCEINLINE_FUNCTION constexpr int padded(int numbers) { return (numbers + 3) / 4 * 4; }
 
+/// Distance between two numbers of a slot: one slot per corner, and an odd number of cache lines so
+/// that the numbers of one slot do not fall into the same cache set.
+KOKKOS_FORCEINLINE_FUNCTION constexpr int slot_stride(int packs, int lanes) {
+  return packs * 4 * lanes + 16;
+}
+
+/// Numbers that a sweep over patches of up to so many packs and local vertices keeps at hand: two
+/// vectors of each vertex,
+KOKKOS_FORCEINLINE_FUNCTION constexpr std::size_t row_numbers(int locals) {
+  return std::size_t(8) * locals;
+}
+/// what corners receive, `numbers` each,
+KOKKOS_FORCEINLINE_FUNCTION constexpr std::size_t slot_numbers(int packs, int lanes, int locals,
+                                                               int numbers) {
+  std::size_t const slots = std::size_t(numbers) * slot_stride(packs, lanes),
+                    rows = std::size_t(locals) * padded(numbers);
+  return slots > rows ? slots : rows;
+}
+/// and one number of each element.
+KOKKOS_FORCEINLINE_FUNCTION constexpr std::size_t element_numbers(int packs, int lanes) {
+  return std::size_t(packs) * lanes;
+}
+
+/// Bytes that a gradient sweep, which needs the most of all, asks for.
+constexpr std::size_t gradient_sweep_bytes(int packs, int lanes, int locals, int numbers,
+                                           std::size_t number_bytes) {
+  constexpr std::size_t alignment = 3 * sizeof(double);
+  return number_bytes * (row_numbers(locals) + slot_numbers(packs, lanes, locals, numbers) +
+                         element_numbers(packs, lanes)) +
+         alignment;
+}
+
+/// What Kokkos leaves a team of the 48 KiB that a block of threads has on any NVIDIA GPU, rounded
+/// down.
+inline constexpr std::size_t device_scratch = 39 * 1024;
+
+/// Tets per patch with which a gradient sweep of `numbers` per corner fits into `bytes`. Patches
+/// have half as many vertices as tets, or fewer, unless they are tiny or branch out.
+constexpr int patch_size_within(std::size_t bytes, int lanes, int numbers,
+                                std::size_t number_bytes) {
+  int size = lanes;  // full packs
+  auto const needed = [&](int tets) {
+    return gradient_sweep_bytes(tets / lanes, lanes, tets / 2, numbers, number_bytes);
+  };
+  while (needed(size + lanes) <= bytes) size += lanes;
+  return size;
+}
+
+/// The same for a device: with blocks in single precision, with a diagonal in double precision, of
+/// which blocks would leave too few tets to keep a team busy.
+constexpr int device_patch_size(int lanes, std::size_t number_bytes) {
+  return patch_size_within(device_scratch, lanes, number_bytes < sizeof(double) ? 9 : 6,
+                           number_bytes);
+}
+
 /// Where a sweep leaves what vertices receive: with the vertices that belong to one patch alone,
 /// and in a row of `partial`, of padded(numbers), for each patch that shares a vertex.
 template <class S, class Real>
@@ -59,6 +114,13 @@ struct PatchSweep {
   static constexpr int per_pack = lanes / width;  ///< groups in a pack
 
   PatchViews<S, Real> patches;
+  int scratch_level = 0;  ///< of what `room` gives; see for_each_team
+
+  template <class Team>
+  KOKKOS_FORCEINLINE_FUNCTION ScratchField<S, Real> room(Team const& team,
+                                                         std::size_t numbers) const {
+    return ScratchField<S, Real>(team.team_scratch(S::on_host ? 0 : scratch_level), numbers);
+  }
 
   KOKKOS_FORCEINLINE_FUNCTION int locals(int patch) const {
     return patches.local_begin(patch + 1) - patches.local_begin(patch);
@@ -91,7 +153,7 @@ struct PatchSweep {
   }
   /// Numbers in those rows.
   KOKKOS_FORCEINLINE_FUNCTION std::size_t row_numbers() const {
-    return std::size_t(8) * patches.max_locals;
+    return kernels::row_numbers(patches.max_locals);
   }
 
   /// The elements of one patch behind plain pointers, which stay in registers through the stores of
@@ -173,7 +235,7 @@ struct PatchSweep {
   }
   /// Size of the field that `give` works on, for `numbers` per corner.
   KOKKOS_FORCEINLINE_FUNCTION std::size_t slot_numbers(int numbers) const {
-    return Kokkos::max(numbers * stride(), patches.max_locals * padded(numbers));
+    return kernels::slot_numbers(patches.max_packs, lanes, patches.max_locals, numbers);
   }
   template <int numbers, class Team>
   KOKKOS_FORCEINLINE_FUNCTION void clear(Team const& team, int patch,
@@ -227,7 +289,7 @@ struct PatchSweep {
 
   /// Room for a number of each element of the largest patch.
   KOKKOS_FORCEINLINE_FUNCTION std::size_t element_numbers() const {
-    return std::size_t(patches.max_packs) * lanes;
+    return kernels::element_numbers(patches.max_packs, lanes);
   }
   /// Adds up what `store` has left of each group, lane by lane and then the lanes, into the patch's
   /// entry of `total`.
@@ -255,9 +317,7 @@ struct PatchSweep {
   }
 
 private:
-  /// Distance between two numbers of a slot: one slot per corner, and an odd number of cache lines
-  /// so that the numbers of one slot do not fall into the same cache set.
-  KOKKOS_FORCEINLINE_FUNCTION int stride() const { return patches.max_packs * 4 * lanes + 16; }
+  KOKKOS_FORCEINLINE_FUNCTION int stride() const { return slot_stride(patches.max_packs, lanes); }
 };
 
 }  // namespace taut::kernels

@@ -10,6 +10,7 @@
 // not depend on the size of the team.
 #pragma once
 
+#include <taut/core/exec/parallel.hpp>
 #include <taut/core/report/error.hpp>
 #include <taut/core/sparse/block_csr.hpp>
 
@@ -206,7 +207,7 @@ public:
     kernels::FactorAggregate<S, Storage, Load> kernel{load, factor_, run_, 0};
     using Policy = typename S::team_policy;
     int const bytes = static_cast<int>(kernel.scratch_size());
-    kernel.scratch_level = bytes <= Policy::scratch_size_max(0) ? 0 : 1;
+    kernel.scratch_level = kernels::scratch_level(bytes, Policy::scratch_size_max(0));
     int floored = 0;
     Kokkos::parallel_reduce(label("schwarz_factor"),
                             policy().set_scratch_size(kernel.scratch_level, Kokkos::PerTeam(bytes)),
