@@ -3,6 +3,8 @@
 
 #include <taut/core/report/error.hpp>
 
+#include <fmt/ranges.h>
+
 #include <string>
 #include <vector>
 
