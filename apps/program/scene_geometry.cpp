@@ -14,9 +14,9 @@
 namespace taut {
 namespace {
 
-TetMesh unchecked_mesh(SceneObject const& object) {
+TetMesh unchecked_mesh(SceneObject const& object, std::vector<std::string>& warnings) {
   if (auto const* file = std::get_if<std::filesystem::path>(&object.geometry))
-    return read_tet_mesh(*file);
+    return read_tet_mesh(*file, &warnings);
   auto const& [shape, resolution] = std::get<ProceduralShape>(object.geometry);
   try {
     return make_shape(shape, resolution);
@@ -26,7 +26,7 @@ TetMesh unchecked_mesh(SceneObject const& object) {
 }
 
 TetMesh object_mesh(SceneObject const& object, std::vector<std::string>& warnings) {
-  TetMesh mesh = unchecked_mesh(object);
+  TetMesh mesh = unchecked_mesh(object, warnings);
   auto const* file = std::get_if<std::filesystem::path>(&object.geometry);
   MeshReport const report = check_mesh(mesh, file ? file->string() : object.where + ".shape");
   warnings.insert(warnings.end(), report.warnings.begin(), report.warnings.end());

@@ -19,6 +19,33 @@ int nodes_of_type(std::int64_t type) {
   return type > 0 && type < std::ssize(nodes) ? nodes[static_cast<std::size_t>(type)] : 0;
 }
 
+/// What elements of a type fill space with, for sentences; empty if they do not.
+std::string_view solids_of_type(std::int64_t type) {
+  switch (type) {
+    case linear_tet:
+      return "linear tets";
+    case 11:
+    case 29:
+    case 30:
+    case 31:
+      return "tets of higher order";
+    case 5:
+    case 12:
+    case 17:
+      return "hexahedra";
+    case 6:
+    case 13:
+    case 18:
+      return "prisms";
+    case 7:
+    case 14:
+    case 19:
+      return "pyramids";
+    default:
+      return "";
+  }
+}
+
 // The fewest bytes of one entry, which bound what a stated count can mean.
 constexpr std::size_t shortest_node = 8;       // "1 0 0 0\n"
 constexpr std::size_t shortest_element = 4;    // "1 1\n"
@@ -60,9 +87,10 @@ private:
 
 class GmshParser {
 public:
-  GmshParser(std::string_view content, std::string const& name) : scanner_(content, name) {}
+  GmshParser(std::string_view content, std::string const& name)
+      : name_(name), scanner_(content, name) {}
 
-  TetMesh parse() {
+  TetMesh parse(std::vector<std::string>* warnings) {
     if (scanner_.word() != "$MeshFormat") {
       scanner_.fail("a gmsh file begins with $MeshFormat; convert the mesh to MSH 4.1 or 2.2.");
     }
@@ -89,6 +117,7 @@ public:
       }
     }
     if (mesh_.tets.empty()) fail_without_tets();
+    if (warnings) warn_of_solids(*warnings);
     return std::move(mesh_);
   }
 
@@ -273,6 +302,22 @@ private:
     }
   }
 
+  /// Points, lines and faces belong to the geometry that was meshed; what fills space is a piece of
+  /// the body that will be missing.
+  void warn_of_solids(std::vector<std::string>& warnings) const {
+    std::string solids;
+    for (const auto& [type, count] : passed_over_) {
+      const std::string_view kind = solids_of_type(type);
+      if (kind.empty()) continue;
+      solids += fmt::format("{}{} {} (type {})", solids.empty() ? "" : ", ", count, kind, type);
+    }
+    if (solids.empty()) return;
+    warnings.push_back(
+        fmt::format("{}: {} are passed over, the body is of the {} linear tets alone; export a "
+                    "mesh of linear tets",
+                    name_, solids, mesh_.tets.size()));
+  }
+
   [[noreturn]] void fail_without_tets() const {
     std::string types;
     for (const auto& [type, count] : passed_over_) {
@@ -284,6 +329,7 @@ private:
         linear_tet, types.empty() ? "none" : types);
   }
 
+  std::string const& name_;
   Scanner scanner_;
   bool is_4_ = false;
   bool binary_ = false;
@@ -294,8 +340,9 @@ private:
 
 }  // namespace
 
-TetMesh parse_gmsh(std::string_view content, std::string const& name) {
-  return GmshParser(content, name).parse();
+TetMesh parse_gmsh(std::string_view content, std::string const& name,
+                   std::vector<std::string>* warnings) {
+  return GmshParser(content, name).parse(warnings);
 }
 
 }  // namespace taut

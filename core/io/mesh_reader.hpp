@@ -14,11 +14,14 @@
 #include <string>
 #include <string_view>
 #include <taut/core/fem/tet_mesh.hpp>
+#include <vector>
 
 namespace taut {
 
-/// Reads `.msh`, or a TetGen pair named by its `.node`, its `.ele` or their common stem.
-TetMesh read_tet_mesh(std::filesystem::path const& path);
+/// Reads `.msh`, or a TetGen pair named by its `.node`, its `.ele` or their common stem. Adds a
+/// sentence to `warnings` if the file has other elements that fill space, which are passed over.
+TetMesh read_tet_mesh(std::filesystem::path const& path,
+                      std::vector<std::string>* warnings = nullptr);
 
 /// Reads the vertices and faces of a Wavefront OBJ; polygons become fans of triangles.
 TriangleMesh read_obj(std::filesystem::path const& path);
@@ -27,7 +30,8 @@ TriangleMesh read_obj(std::filesystem::path const& path);
 void write_obj(std::filesystem::path const& path, TriangleMesh const& mesh);
 
 // The same from memory; `name` stands for the file in messages.
-TetMesh parse_gmsh(std::string_view content, std::string const& name);
+TetMesh parse_gmsh(std::string_view content, std::string const& name,
+                   std::vector<std::string>* warnings = nullptr);
 TetMesh parse_tetgen(std::string_view nodes, std::string const& node_name,
                      std::string_view elements, std::string const& element_name);
 TriangleMesh parse_obj(std::string_view content, std::string const& name);

@@ -100,16 +100,22 @@ TetMesh parse_tetgen(std::string_view nodes, std::string const& node_name,
       }
       vertex = static_cast<std::int32_t>(node - first_node);
     }
+    // Nodes of a file that counts otherwise could be meant by either number.
+    if (first_tet != first_node) {
+      scanner.fail(
+          "the tets count from {}, the nodes of {} from {}; use the .node and .ele of one export.",
+          first_tet, node_name, first_node);
+    }
     scanner.end_row();
   }
   expect_end(scanner, count, "tets");
   return mesh;
 }
 
-TetMesh read_tet_mesh(std::filesystem::path const& path) {
+TetMesh read_tet_mesh(std::filesystem::path const& path, std::vector<std::string>* warnings) {
   namespace fs = std::filesystem;
   const std::string extension = path.extension().string();
-  if (extension == ".msh") return parse_gmsh(read_file(path), path.string());
+  if (extension == ".msh") return parse_gmsh(read_file(path), path.string(), warnings);
   if (extension == ".obj") {
     throw Error(
         "{}: an OBJ file holds a surface, and tets are needed here; fill it by a mesh generator "

@@ -114,6 +114,8 @@ TEST_CASE("TetGen: what is wrong is named with file and line") {
              {"b.node:4", "not finite"});
   check_says(tetgen_sentence(four, "1\n1 1 2 3 5\n"), {"b.ele:2", "node 5", "b.node", "1 to 4"});
   check_says(tetgen_sentence(four, "1\n1 0 1 2 3\n"), {"b.ele:2", "node 0"});
+  check_says(tetgen_sentence(four, "1\n0 1 2 3 4\n"),
+             {"b.ele:2", "tets count from 0", "b.node from 1"});
   check_says(tetgen_sentence(four, "1 10 0\n1 1 2 3 4 5 6 7 8 9 10\n"), {"b.ele:1", "linear"});
   check_says(tetgen_sentence(four, "0\n"), {"b.ele", "no tets"});
   check_says(tetgen_sentence(four, "1000000\n1 1 2 3 4\n"), {"1000000 tets", "truncated"});

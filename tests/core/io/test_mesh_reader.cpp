@@ -35,6 +35,22 @@ TEST_CASE("gmsh files with carriage returns are read") {
   check_equal(parse_gmsh(text, "a.msh"), two_tets());
 }
 
+TEST_CASE("gmsh elements that fill space and are passed over are warned of") {
+  std::vector<std::string> warnings;
+  check_equal(parse_gmsh(msh_2(two_tets(), false), "a.msh", &warnings), two_tets());
+  CHECK(warnings.empty());  // its triangles are the surface of what the tets fill
+  // Two more, a prism and a tet of ten nodes, whose nodes nobody looks at.
+  std::string text = msh_2(two_tets(), false);
+  const std::string tail = "$EndElements", count = "$Elements\n3\n";
+  text.insert(text.find(tail), "8 6 2 5 6 1 1 1 1 1 1\n9 11 2 5 6 1 1 1 1 1 1 1 1 1 1\n");
+  REQUIRE(text.find(count) != std::string::npos);
+  text.replace(text.find(count), count.size(), "$Elements\n5\n");
+  check_equal(parse_gmsh(text, "a.msh", &warnings), two_tets());
+  REQUIRE(warnings.size() == 1);
+  check_says(warnings[0], {"a.msh: 1 prisms (type 6), 1 tets of higher order (type 11) are passed",
+                           "of the 2 linear tets alone"});
+}
+
 TEST_CASE("TetGen pairs count from 0 or 1 and have short or full headers") {
   const TetMesh mesh = two_tets();
   for (const int base : {0, 1}) {
