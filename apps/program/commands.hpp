@@ -1,5 +1,5 @@
-// The commands of the program, one function each; main.cpp maps the command line onto their
-// options. All return the exit status and throw Error for what the user can mend.
+// The commands of the program, one function each; program.cpp maps the command line onto
+// their options. All return the exit status and throw Error for what the user can mend.
 #pragma once
 
 #include <taut/apps/program/scene.hpp>

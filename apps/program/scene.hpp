@@ -227,7 +227,7 @@ struct OutputOptions {
   int every = 1;      ///< frames between written frames
   bool obj = false;   ///< also a surface per written frame
   bool vdb = false;   ///< also the grid of material points and their surface per written frame
-  bool check = true;  ///< look for inverted elements and non-finite values
+  bool check = true;  ///< count inverted elements, or particles, after each step
 };
 
 /// A family of scenes: the override `key`=value for each of the values.
