@@ -39,6 +39,11 @@ void check_start(Scene const& scene, SceneGeometry& geometry, std::span<Point co
   geometry.warnings.push_back(what + ". Nothing keeps bodies apart: [contact] would");
 }
 
+/// An iteration of a step leaves intersections.
+class IntersectingIteration : public Error {
+  using Error::Error;
+};
+
 /// The run of a scene of meshes.
 class MeshRun final : public RunLoop {
 public:
@@ -60,9 +65,16 @@ private:
     before_ = {};
     if (surface_) simulation_->save(before_);
   }
-  NewtonReport step() override { return simulation_->step(watch_iterations()); }
+  NewtonReport step() override {
+    try {
+      return simulation_->step(watch_iterations());
+    } catch (IntersectingIteration const&) {
+      take_back();
+      throw;
+    }
+  }
   void accept_step() override {
-    if (surface_) refuse_intersections(before_);
+    if (surface_) refuse_intersections();
   }
 
   void add_to_line(Record& line) override {
@@ -82,19 +94,30 @@ private:
     }
   }
 
-  /// After a step that leaves intersections: goes back to the state before it, puts that into the
-  /// result and throws.
-  void refuse_intersections(Checkpoint const& before) {
+  /// After a step that leaves intersections: takes it back and throws.
+  void refuse_intersections() {
     auto const found = surface_->find(simulation_->positions());
-    if (found.empty()) return;
+    if (found.empty()) {
+      ++totals().checked_steps;
+      return;
+    }
     int const step = simulation_->steps();
     double const time = simulation_->time();
-    simulation_->restore(before);
+    take_back();
+    throw Error("step {} at {:.6g} s leaves {}; the first: {}. {}", step, time,
+                surface_->count(found), surface_->text(found.front()), what_now());
+  }
+  /// Of a step with intersections: goes back to the state before it and puts that into the result.
+  void take_back() {
+    ++totals().checked_steps;
+    ++totals().intersecting_steps;
+    simulation_->restore(before_);
     write_frame_off_grid();
-    throw Error(
-        "step {} at {:.6g} s leaves {}; the first: {}. The state before it is the last frame. {}: "
-        "--restart without --check goes on",
-        step, time, surface_->count(found), surface_->text(found.front()), who_is_to_blame());
+  }
+  std::string what_now() const {
+    return fmt::format(
+        "The state before it is the last frame. {}: --restart without --check goes on",
+        who_is_to_blame());
   }
   std::string who_is_to_blame() const {
     if (!scene_.contact) return "Nothing keeps bodies apart, add a table [contact]";
@@ -103,14 +126,27 @@ private:
     }
     return "That must not happen with contact, report it together with the scene";
   }
+  /// What the steps were looked at for, by all legs of the run.
+  std::string intersections() const {
+    RunTotals const& t = totals();
+    if (t.checked_steps == 0) return "not looked for";
+    if (t.intersecting_steps > 0) {
+      return fmt::format("in {:.0f} of {:.0f} steps looked at", t.intersecting_steps,
+                         t.checked_steps);
+    }
+    return t.checked_steps == t.steps
+               ? "none"
+               : fmt::format("none in {:.0f} of {:.0f} steps", t.checked_steps, t.steps);
+  }
   IterationObserver watch_iterations() const {
     if (check_ != CheckRun::every_iteration) return {};
     return [&](IterationView const& view) {
       auto const found = surface_->find(view.positions());
       if (found.empty()) return;
-      throw Error("step {} at {:.6g} s: iteration {} leaves {}; the first: {}. {}",
-                  simulation_->steps() + 1, simulation_->time(), view.index + 1,
-                  surface_->count(found), surface_->text(found.front()), who_is_to_blame());
+      throw IntersectingIteration("step {} at {:.6g} s: iteration {} leaves {}; the first: {}. {}",
+                                  simulation_->steps() + 1, simulation_->time(), view.index + 1,
+                                  surface_->count(found), surface_->text(found.front()),
+                                  what_now());
     };
   }
 
@@ -133,7 +169,7 @@ private:
         .set("preconditioner_because", preconditioner.reason)
         .set("most_inverted_elements", static_cast<std::int64_t>(totals().most_inverted))
         .set("steps_with_inverted_elements", static_cast<std::int64_t>(totals().inverted_steps))
-        .set("intersections", std::string(check_ == CheckRun::off ? "not looked for" : "none"))
+        .set("intersections", intersections())
         .set("warnings", geometry_.warnings);
   }
   void set_contact(Record& summary) const {
@@ -148,7 +184,8 @@ private:
       fmt::print(
           "contact  {:.1f} pairs on average, {:.0f} at most; smallest gap {:.2g} of dhat{}\n",
           totals().steps > 0 ? totals().contacts / totals().steps : 0, totals().most_contacts,
-          totals().smallest_gap, surface_ ? "; no intersections" : "");
+          totals().smallest_gap,
+          totals().checked_steps > 0 ? "; intersections: " + intersections() : "");
     }
     if (totals().inverted_steps > 0) {
       fmt::print(

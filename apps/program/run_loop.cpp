@@ -41,19 +41,23 @@ private:
   void (*before_term_)(int);
 };
 
-/// Removes what an earlier run left that this one does not overwrite at once.
-void clear_folder(std::filesystem::path const& folder) {
-  for (char const* name : {"checkpoint.h5", "summary.json", "report.jsonl"})
-    std::filesystem::remove(folder / name);
+constexpr char const* result_name = "result.vtkhdf";
+
+/// What an earlier run left, of the names that this one writes; the result first.
+std::vector<std::filesystem::path> left_by_a_run(std::filesystem::path const& folder) {
+  std::vector<std::filesystem::path> files;
+  for (char const* name :
+       {result_name, "result.xdmf", "checkpoint.h5", "summary.json", "report.jsonl"}) {
+    if (std::filesystem::exists(folder / name)) files.push_back(folder / name);
+  }
   std::error_code none;
   for (std::string const kind : {"obj", "vdb"}) {
     for (auto const& entry : std::filesystem::directory_iterator(folder / kind, none)) {
       std::string const name = entry.path().filename().string();
-      if (name.starts_with("frame_") && name.ends_with("." + kind)) {
-        std::filesystem::remove(entry.path());
-      }
+      if (name.starts_with("frame_") && name.ends_with("." + kind)) files.push_back(entry.path());
     }
   }
+  return files;
 }
 
 /// In a checkpoint, of the changes of the solver.
@@ -72,9 +76,10 @@ void attempt(Action&& action) {
 }  // namespace
 
 std::vector<double> RunTotals::to_numbers() const {
-  return {seconds,       steps,          converged,  iterations, restarts,      worst_error,
-          most_inverted, inverted_steps, cut_steps,  contacts,   most_contacts, smallest_gap,
-          work,          most_islands,   grid_steps, halvings,   most_nodes};
+  return {seconds,       steps,         converged,      iterations,        restarts,
+          worst_error,   most_inverted, inverted_steps, cut_steps,         contacts,
+          most_contacts, smallest_gap,  work,           most_islands,      grid_steps,
+          halvings,      most_nodes,    checked_steps,  intersecting_steps};
 }
 
 RunTotals RunTotals::from_numbers(std::vector<double> const& n) {
@@ -82,8 +87,8 @@ RunTotals RunTotals::from_numbers(std::vector<double> const& n) {
     throw Error("the checkpoint has {} totals, {} are needed: start the run again", n.size(),
                 RunTotals().to_numbers().size());
   }
-  return {n[0], n[1],  n[2],  n[3],  n[4],  n[5],  n[6],  n[7], n[8],
-          n[9], n[10], n[11], n[12], n[13], n[14], n[15], n[16]};
+  return {n[0],  n[1],  n[2],  n[3],  n[4],  n[5],  n[6],  n[7],  n[8], n[9],
+          n[10], n[11], n[12], n[13], n[14], n[15], n[16], n[17], n[18]};
 }
 
 RunLoop::RunLoop(Scene const& scene, RunOptions const& options, ResultMesh start,
@@ -132,14 +137,16 @@ int RunLoop::run() {
 }
 
 void RunLoop::begin() {
-  if (std::filesystem::exists(result_path())) {
+  for (std::filesystem::path const& file : left_by_a_run(folder_)) {
+    bool const is_result = file == result_path();
     if (!force_) {
       throw Error(
-          "{}: a result is there already: choose another --out, continue it with --restart or "
-          "replace it with --force",
-          folder_.string());
+          "{}: {} is there already: choose another --out{} or replace it with --force",
+          folder_.string(),
+          is_result ? "a result" : file.lexically_relative(folder_).string() + " of another run",
+          is_result ? ", continue it with --restart" : "");
     }
-    clear_folder(folder_);
+    if (!is_result) std::filesystem::remove(file);  // the result is replaced in one step
   }
   result_.emplace(ResultWriter::create(
       result_path(), start_, capacity(),
@@ -172,6 +179,8 @@ void RunLoop::go_on() {
   // Line k of the report is step k, counted from 1.
   log_.emplace(folder_ / "report.jsonl", recorded_ + 1);
 }
+
+std::filesystem::path RunLoop::result_path() const { return folder_ / result_name; }
 
 std::int64_t RunLoop::capacity() const {  // every so many steps, and the last one
   return (scene_.frames + scene_.output.every - 1) / scene_.output.every + 1;
@@ -234,6 +243,8 @@ void RunLoop::take_step() {
 void RunLoop::checkpoint() {
   Checkpoint checkpoint;
   simulation().save(checkpoint);
+  // A restart needs the frames that the checkpoint counts: it waits for the disk, and so do they.
+  result_->sync();
   checkpoint.set("frames_written",
                  std::vector<std::int32_t>{static_cast<std::int32_t>(result_->frames())});
   checkpoint.set("totals", totals_.to_numbers());

@@ -27,6 +27,8 @@ struct RunTotals {
   double most_islands = 0;  ///< in one step
   double grid_steps = 0, halvings = 0;  ///< of material points
   double most_nodes = 0;                ///< of their grid
+  double checked_steps = 0;             ///< looked at for intersections, those taken back included
+  double intersecting_steps = 0;        ///< of these, with any
 
   std::vector<double> to_numbers() const;
   /// Throws Error if these are not as many.
@@ -71,7 +73,7 @@ private:
   void begin();
   void go_on();
   bool on_grid() const { return simulation().steps() % scene_.output.every == 0; }
-  std::filesystem::path result_path() const { return folder_ / "result.vtkhdf"; }
+  std::filesystem::path result_path() const;
   std::int64_t capacity() const;
   void take_step();
   void checkpoint();

@@ -1,3 +1,4 @@
+#include <fcntl.h>
 #include <unistd.h>
 
 #include <cerrno>
@@ -41,6 +42,21 @@ std::string read_file(fs::path const& path) {
                 reason(errno));
   }
   return content;
+}
+
+void sync_file(fs::path const& path) {
+  const fs::path folder = path.has_parent_path() ? path.parent_path() : fs::path(".");
+  for (fs::path const& one : {path, folder}) {
+    const int file = ::open(one.c_str(), O_RDONLY | O_CLOEXEC);
+    const bool synced = file >= 0 && ::fsync(file) == 0;
+    const int error = errno;
+    if (file >= 0) ::close(file);
+    // Not every file system knows how to wait for a folder.
+    if (!synced && one == path) {
+      throw Error("{}: cannot be written to the disk ({}); choose another output folder.",
+                  path.string(), reason(error));
+    }
+  }
 }
 
 void make_parent_folder(fs::path const& path) {

@@ -23,6 +23,9 @@ void write_file_atomically(std::filesystem::path const& path, std::string_view c
 void write_file_from(std::filesystem::path const& path, std::size_t offset,
                      std::string_view content);
 
+/// Waits until a file and its name are on the disk. Throws Error when that cannot be.
+void sync_file(std::filesystem::path const& path);
+
 /// Makes the folders above `path`. Throws Error naming the folder.
 void make_parent_folder(std::filesystem::path const& path);
 

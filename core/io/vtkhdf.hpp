@@ -60,6 +60,10 @@ class ResultWriter {
 public:
   enum class IfExists { refuse, replace };
 
+  /// What a result is laid out for at most before it has more frames: each takes some memory and
+  /// disk space at once.
+  static constexpr std::int64_t most_capacity = 1 << 17;
+
   /// Begins a result at `path` (name it .vtkhdf) laid out for `capacity` frames; missing folders
   /// are made, the layout grows if more are appended. `velocities`: whether frames carry them.
   /// Throws Error if the file exists and is not to be replaced, if it cannot be written, or if
@@ -83,6 +87,9 @@ public:
   /// written; the earlier frames are then intact.
   void append(double time, std::span<Point const> positions, std::span<Point const> velocities,
               std::span<std::vector<double> const> scalars = {});
+
+  /// Waits until the frames are on the disk, where they survive a failing machine.
+  void sync() const;
 
   std::int64_t frames() const;
 

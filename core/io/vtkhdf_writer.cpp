@@ -12,8 +12,8 @@
 // /VTKHDF, which HDF5 writes whole, and which fits the first page of the file: one write within one
 // page, which the operating system does entirely or not at all.
 //
-// This orders the writes against a kill of the process. Against a failing machine there is the
-// checkpoint (checkpoint.hpp), which waits for the disk.
+// This orders the writes against a kill of the process. Against a failing machine there are the
+// checkpoint (checkpoint.hpp) and, before it, sync(), which wait for the disk.
 #include <algorithm>
 #include <array>
 #include <taut/core/io/file.hpp>
@@ -98,7 +98,8 @@ struct ResultWriter::File {
 
   void open() {
     {
-      // Closed before the file is opened for writing: HDF5 refuses both in one process.
+      // Closed before the file is opened for writing, which HDF5 refuses while the process has it
+      // open for reading; behind a writer it lets a reader in.
       ResultReader const reader(path_);
       shape_ = shape_of(reader.mesh(), reader.capacity(), reader.has_velocities());
       times_ = reader.times();
@@ -227,6 +228,9 @@ ResultWriter::~ResultWriter() = default;
 
 std::int64_t ResultWriter::frames() const { return std::ssize(file_->times_); }
 
+// Every commit leaves nothing in HDF5's buffers.
+void ResultWriter::sync() const { sync_file(file_->path_); }
+
 ResultWriter ResultWriter::create(fs::path const& path, ResultMesh const& mesh,
                                   std::int64_t capacity, IfExists if_exists, bool velocities) {
   if (if_exists == IfExists::refuse && fs::exists(path)) {
@@ -255,7 +259,7 @@ ResultWriter ResultWriter::create(fs::path const& path, ResultMesh const& mesh,
   }
   make_parent_folder(path);
   name_errors(path, "the result cannot be begun", [&] {
-    const std::int64_t frames = std::max<std::int64_t>(1, capacity);
+    const std::int64_t frames = std::clamp<std::int64_t>(capacity, 1, most_capacity);
     check_free_space(path, mesh, frames);
     replace_file(path, [&](fs::path const& file) { lay_out(file, mesh, frames, velocities); });
   });
@@ -292,7 +296,7 @@ ResultWriter ResultWriter::resume(fs::path const& path, ResultMesh const& mesh, 
   name_errors(path, "the result cannot be continued", [&] {
     file->times_.resize(static_cast<std::size_t>(frames));
     file->counts_.resize(file->times_.size());
-    const std::int64_t room = std::max(capacity, file->shape_.capacity);
+    const std::int64_t room = std::max(std::min(capacity, most_capacity), file->shape_.capacity);
     bool whole = true;
     try {
       file->commit();

@@ -360,6 +360,7 @@ TEST_CASE("a checked run ends before the first step that intersects", "[intersec
                                       ContainsSubstring("The state before it is the last frame")));
   CHECK(scene.summary().at("ended") == "stopped by an error");
   CHECK(scene.summary().at("frames") == 2);
+  CHECK(scene.summary().at("intersections") == "in 1 of 3 steps looked at");
   CHECK(scene.result().frames() == (every == 1 ? 3 : 2));
   CHECK(scene.result().times().back() == 0.02);
   std::string const report = read_file(scene.options.out / "report.jsonl");
@@ -373,6 +374,7 @@ TEST_CASE("a checked run ends before the first step that intersects", "[intersec
                        MessageMatches(ContainsSubstring("step 3 at 0.03 s leaves ")));
   scene.options.check = CheckRun::off;
   CHECK(run_command(scene.options) == 0);
+  CHECK(scene.summary().at("intersections") == "in 2 of 4 steps looked at");
   CHECK(check_command(scene.options.out) == 1);
   Collision other;
   other.options.scene.changes = scene.options.scene.changes;
@@ -381,6 +383,48 @@ TEST_CASE("a checked run ends before the first step that intersects", "[intersec
   for (int k = 0; k < other.result().frames(); ++k)
     CHECK(scene.result().positions(k) == other.result().positions(k));
   if (every == 1) CHECK(last_good == other.result().positions(2));
+}
+
+TEST_CASE("an iteration that intersects leaves the state before its step as the last frame",
+          "[intersections]") {
+  // What spins needs iterations, of which the third step's are the first to intersect.
+  std::string const spin = "object.left.velocity={ axis = [1, 0, 0], angular_velocity = 100 }";
+  Collision scene;
+  scene.options.check = CheckRun::every_iteration;
+  scene.options.scene.changes.overrides = {"output.every=4", spin};
+  CHECK_THROWS_MATCHES(run_command(scene.options), Error,
+                       MessageMatches(ContainsSubstring("step 3 at 0.02 s: iteration ") &&
+                                      ContainsSubstring("The state before it is the last frame")));
+  CHECK(scene.summary().at("intersections") == "in 1 of 3 steps looked at");
+  CHECK(scene.result().times() == std::vector<double>{0, 0.02});
+  Collision other;
+  other.options.scene.changes.overrides = {"time.frames=2", spin};
+  CHECK(run_command(other.options) == 0);
+  CHECK(scene.result().positions(1) == other.result().positions(2));
+
+  scene.options.restart = true;
+  scene.options.check = CheckRun::off;
+  CHECK(run_command(scene.options) == 0);
+  CHECK(scene.result().frames() == 3);
+}
+
+TEST_CASE("the summary says of how many steps it knows intersections", "[intersections]") {
+  Collision scene;
+  auto const leg = [&](int frames, CheckRun check) {
+    scene.options.scene.changes.overrides = {"time.frames=" + std::to_string(frames)};
+    scene.options.check = check;
+    CHECK(run_command(scene.options) == 0);
+    scene.options.restart = true;
+    return scene.summary().at("intersections").get<std::string>();
+  };
+  SECTION("looked for from the second step on") {
+    CHECK(leg(1, CheckRun::off) == "not looked for");
+    CHECK(leg(2, CheckRun::every_step) == "none in 1 of 2 steps");
+  }
+  SECTION("no more looked for") {
+    CHECK(leg(2, CheckRun::every_step) == "none");
+    CHECK(leg(4, CheckRun::off) == "none in 2 of 4 steps");
+  }
 }
 
 TEST_CASE("a run without an intersection is the same with the check", "[intersections]") {

@@ -141,6 +141,32 @@ TEST_CASE("a result grows beyond the frames it was laid out for") {
   CHECK(std::distance(begin(entries), end(entries)) == 2);
 }
 
+TEST_CASE("a result of very many frames is laid out for some of them", "[io][result]") {
+  const Folder folder;
+  const auto path = folder / "result.vtkhdf";
+  constexpr std::int64_t very_many = 100'000'000;
+  {
+    auto writer = ResultWriter::create(path, sample(), very_many, ResultWriter::IfExists::refuse);
+    append_frames(writer, 0, 3);
+    writer.sync();
+  }
+  CHECK(ResultReader(path).capacity() == ResultWriter::most_capacity);
+  CHECK(std::filesystem::file_size(path) < 1 << 28);
+  auto writer = ResultWriter::resume(path, sample(), 2, very_many);
+  append_frames(writer, 2, 3);
+  check_frames(path, 3);
+  CHECK(ResultReader(path).capacity() == ResultWriter::most_capacity);
+}
+
+TEST_CASE("a result that is gone cannot wait for the disk", "[io][result]") {
+  const Folder folder;
+  const auto path = folder / "result.vtkhdf";
+  auto writer = ResultWriter::create(path, sample(), 2, ResultWriter::IfExists::refuse);
+  CHECK_NOTHROW(writer.sync());
+  std::filesystem::remove(path);
+  check_says(sentence([&] { writer.sync(); }), {path.string(), "cannot be written to the disk"});
+}
+
 TEST_CASE("a resumed result drops later frames and ends as an uninterrupted one") {
   const Folder folder;
   const auto path = folder / "result.vtkhdf";
