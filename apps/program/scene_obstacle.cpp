@@ -38,13 +38,15 @@ void drop_unused(TriangleMesh& mesh) {
     for (std::int32_t& v : triangle) v = number[static_cast<std::size_t>(v)];
 }
 
+/// Of a closed surface; from a vertex of it, for far from the origin all digits would cancel.
 double volume(TriangleMesh const& mesh) {
+  Point const& origin = mesh.points.front();
+  auto const from_origin = [&](std::int32_t v) {
+    return mesh.points[static_cast<std::size_t>(v)] - origin;
+  };
   double sum = 0;
   for (auto const& [a, b, c] : mesh.triangles)
-    sum += dot(mesh.points[static_cast<std::size_t>(a)],
-               cross(mesh.points[static_cast<std::size_t>(b)],
-                     mesh.points[static_cast<std::size_t>(c)])) /
-           6;
+    sum += dot(from_origin(a), cross(from_origin(b), from_origin(c))) / 6;
   return sum;
 }
 

@@ -203,6 +203,15 @@ TEST_CASE("a surface from a file: closed ones are turned outward, open ones warn
   REQUIRE(warnings.size() == 1);
   CHECK_THAT(warnings[0], ContainsSubstring("oriented inward and have been turned round"));
 
+  // A small one far away: what its orientation is told by must not drown in the distance.
+  for (double const away : {-2e3 / 3, 1e4 / 7, -3e4 / 7}) {
+    CAPTURE(away);
+    TriangleMesh outward = cube;
+    for (Point& x : outward.points) x = 1e-3 * x + Point{away, 0.7 * away, -0.3 * away};
+    CHECK(read(outward, warnings).triangles == outward.triangles);
+    CHECK(warnings.empty());
+  }
+
   TriangleMesh open = cube;
   open.triangles.pop_back();
   CHECK(read(open, warnings).triangles.size() == open.triangles.size());
