@@ -6,6 +6,7 @@
 #include <taut/apps/program/particle_geometry.hpp>
 #include <taut/apps/program/particle_methods.hpp>
 #include <taut/apps/program/scene_geometry.hpp>
+#include <taut/contact/surface.hpp>
 #include <taut/core/fem/rest_shape.hpp>
 #include <taut/core/report/error.hpp>
 
@@ -109,19 +110,31 @@ std::string stop_of(SolverOptions const& solver, double edge, double h, bool qua
   return text;
 }
 
-void print_contact(Scene const& scene) {
+/// From what distance on contact acts, m, if the scene does not say: as its simulation finds it.
+double usual_dhat(SceneGeometry const& geometry) {
+  std::vector<int> object(geometry.mesh.points.size());
+  for (std::size_t k = 0; k < geometry.objects.size(); ++k) {
+    ObjectPart const& part = geometry.objects[k];
+    std::fill_n(object.begin() + part.first_vertex, part.vertices, static_cast<int>(k));
+  }
+  return default_dhat(make_surface(boundary_faces(geometry.mesh.tets), object),
+                      geometry.mesh.points);
+}
+
+void print_contact(Scene const& scene, SceneGeometry const& geometry) {
   if (!scene.contact) {
     fmt::print("  (no contact: no [contact], so bodies pass through each other)\n");
     return;
   }
   ContactOptions const& contact = *scene.contact;
   double const dhat = contact.number("dhat");
-  fmt::print(
-      "  contact       keeps bodies apart: {} barrier below {}, {} curvature, {}\n",
-      contact.text("barrier"),
-      dhat > 0 ? fmt::format("{:.3g} m", dhat) : "0.3 of the mean edge of the finest surface",
-      contact.text("curvature"),
-      contact.flag("mollifier") ? "parallel edges mollified" : "parallel edges as they are");
+  fmt::print("  contact       keeps bodies apart: {} barrier below {}, {} curvature, {}\n",
+             contact.text("barrier"),
+             dhat > 0 ? fmt::format("{:.3g} m", dhat)
+                      : fmt::format("{:.3g} m (0.3 of the mean edge of the finest surface)",
+                                    usual_dhat(geometry)),
+             contact.text("curvature"),
+             contact.flag("mollifier") ? "parallel edges mollified" : "parallel edges as they are");
   fmt::print("                pairs by {}, stiffness {}\n", contact.text("search"),
              contact.text("stiffness"));
   fmt::print("                steps by {}: {}\n", contact.text("bound"),
@@ -244,8 +257,9 @@ int methods_command() {
 int plan_command(SceneArguments const& arguments) {
   Scene const scene = load_scene(find_scene(arguments.scene), arguments.changes);
   if (scene.particles) return plan_particles(scene);
-  SceneGeometry const geometry = build_geometry(scene);
   SolverOptions const& solver = scene.solver;
+  require_of_meshes(solver);
+  SceneGeometry const geometry = build_geometry(scene);
   double const h = scene.step, edge = mean_edge_length(geometry.mesh);
 
   fmt::print("{}: {}\n", scene.name, scene.description);
@@ -291,7 +305,7 @@ int plan_command(SceneArguments const& arguments) {
     fmt::print("  pins          prescribe {} vertices, which leave the unknowns while held\n",
                pinned);
   }
-  print_contact(scene);
+  print_contact(scene, geometry);
 
   fmt::print("minimiser\n");
   bool const quasi_static = scene.scheme == TimeScheme::quasi_static;

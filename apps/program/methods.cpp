@@ -1,5 +1,8 @@
 #include <taut/apps/program/methods.hpp>
 
+#include <taut/core/report/error.hpp>
+
+#include <algorithm>
 #include <array>
 
 namespace taut {
@@ -21,6 +24,30 @@ std::span<MethodTitle const> method_titles() {
       MethodTitle{"newton", "Newton", "projected Newton with PCG: the reference of all charts"},
       MethodTitle{"gradient", "gradient", "preconditioned gradient descent: the floor"}};
   return titles;
+}
+
+void require_of_meshes(SolverOptions const& options) {
+  std::string const& method = options.text("method");
+  auto const titles = method_titles();
+  if (std::none_of(titles.begin(), titles.end(),
+                   [&](MethodTitle const& title) { return title.name == method; })) {
+    throw Error(
+        "solver.method = \"{}\" is of scenes of material points: choose lbfgs, newton, chebyshev "
+        "or a nonlinear CG",
+        method);
+  }
+  if (options.text("preconditioner") == "multigrid") {
+    throw Error(
+        "solver.preconditioner = \"multigrid\" needs the nodes of a grid, which a scene of meshes "
+        "does not have: choose schwarz_32, or add a table [grid]");
+  }
+  std::string const& stopping = options.text("stopping");
+  if (stopping == "characteristic_norm" || stopping == "momentum_norm") {
+    throw Error(
+        "solver.stopping = \"{}\" is of scenes of material points: choose decrement_window, "
+        "energy_drop or gradient_norm",
+        stopping);
+  }
 }
 
 }  // namespace taut

@@ -22,6 +22,9 @@ using ProgramPotential =
 /// All methods, in the order in which they are listed and drawn.
 std::span<MethodTitle const> method_titles();
 
+/// Throws Error for options that are of material points alone.
+void require_of_meshes(SolverOptions const& options);
+
 /// A minimiser of the program's potential that was chosen by name.
 template <class P>
 class AnyMinimiser {

@@ -3,14 +3,11 @@
 
 #include <taut/apps/program/methods.hpp>
 #include <taut/apps/program/option_policies.hpp>
-#include <taut/core/report/error.hpp>
 #include <taut/integrators/any_preconditioner.hpp>
 #include <taut/integrators/chebyshev.hpp>
 #include <taut/integrators/direct.hpp>
 #include <taut/integrators/lbfgs.hpp>
 #include <taut/integrators/ncg.hpp>
-
-#include <algorithm>
 
 namespace taut {
 
@@ -24,6 +21,7 @@ public:
   explicit MethodBuilder(SolverOptions const& options) : options_(options) {}
 
   std::unique_ptr<Interface> make() const {
+    require_of_meshes(options_);
     std::string const& method = options_.text("method");
     if (method == "newton") {
       if (options_.text("hessian") == "direct") return newton<Direct>();
@@ -44,14 +42,6 @@ public:
     }
     using Minimiser = Ncg<AnyBeta, AnyPreconditioner, AnyLineSearch, AnyStopping, P, Space>;
     typename Minimiser::Params params;
-    auto const titles = method_titles();
-    if (std::none_of(titles.begin(), titles.end(),
-                     [&](MethodTitle const& title) { return title.name == method; })) {
-      throw Error(
-          "solver.method = \"{}\" is of scenes of material points: choose lbfgs, newton, chebyshev "
-          "or a nonlinear CG",
-          method);
-    }
     params.beta = AnyBeta(method);
     return hold<Minimiser>(params);
   }
@@ -113,12 +103,6 @@ private:
     if (name == "jacobi") return typename Jacobi<P, Space>::Params{.refresh = refresh};
     if (name == "block_jacobi" || name == "auto") {  // where there is no scene to choose for
       return typename BlockJacobi<P, Space>::Params{.refresh = refresh};
-    }
-    if (name == "multigrid") {
-      throw Error(
-          "solver.preconditioner = \"multigrid\" needs the nodes of a grid, which a scene of "
-          "meshes "
-          "does not have: choose schwarz_32, or add a table [grid]");
     }
     typename Schwarz<P, Space>::Params schwarz;
     schwarz.refresh = refresh_of(options_, rare_refresh(options_));

@@ -4,7 +4,6 @@
 #include <taut/apps/program/any_policies.hpp>
 #include <taut/apps/program/scene_options.hpp>
 #include <taut/core/potential/preconditioning.hpp>
-#include <taut/core/report/error.hpp>
 
 namespace taut {
 
@@ -15,18 +14,13 @@ inline AnyLineSearch::Params line_search_of(SolverOptions const& options) {
   return SufficientDecrease::Params{};
 }
 
-/// `window`: that of the method, where the scene asks for none.
+/// Of the rules that meshes and material points share. `window`: that of the method, where the
+/// scene asks for none.
 inline AnyStopping::Params stopping_of(SolverOptions const& options, int window) {
   std::string const& name = options.text("stopping");
   double const tolerance = options.number("tolerance");
   if (name == "energy_drop") return EnergyDrop::Params{.tolerance = tolerance};
   if (name == "gradient_norm") return GradientNorm::Params{tolerance, true};
-  if (name == "characteristic_norm" || name == "momentum_norm") {
-    throw Error(
-        "solver.stopping = \"{}\" is of scenes of material points: choose decrement_window, "
-        "energy_drop or gradient_norm",
-        name);
-  }
   int const asked = options.integer("window");
   return DecrementWindow::Params{.tolerance = name == "budget" ? 0 : tolerance,
                                  .window = asked > 0 ? asked : window};

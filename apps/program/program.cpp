@@ -64,8 +64,9 @@ int taut::run_program(int argc, char** argv) {
   add_shorthand(*run_app, run.scene, "--method", "solver.method", "minimiser");
   add_shorthand(*run_app, run.scene, "--precision", "solver.precision", "fp64, mixed or fp32");
   run_app->add_option("--out", run.out, "folder of the result (results/NAME)");
-  run_app->add_flag("--force", run.force, "replaces a result that is there");
-  run_app->add_flag("--restart", run.restart, "goes on from the checkpoint in --out");
+  auto* force = run_app->add_flag("--force", run.force, "replaces a result that is there");
+  run_app->add_flag("--restart", run.restart, "goes on from the checkpoint in --out")
+      ->excludes(force);
   run_app
       ->add_option(
           "--check", run.check,

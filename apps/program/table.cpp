@@ -8,13 +8,29 @@
 
 #include <nlohmann/json.hpp>
 
+#include <optional>
+
 namespace taut {
 
 namespace {
 
 using Summary = nlohmann::json;
 
-double number(Summary const& s, char const* key) { return s.value(key, 0.0); }
+/// None where there is none, or where it is not finite, which is null in a summary.
+std::optional<double> number_if_any(Summary const& s, char const* key) {
+  auto const found = s.find(key);
+  if (found == s.end() || !found->is_number()) return {};
+  return found->get<double>();
+}
+double number(Summary const& s, char const* key) { return number_if_any(s, key).value_or(0); }
+std::string number_or_dash(Summary const& s, char const* key, char const* format) {
+  auto const found = number_if_any(s, key);
+  return found ? fmt::format(fmt::runtime(format), *found) : "-";
+}
+std::string text(Summary const& s, char const* key) {
+  auto const found = s.find(key);
+  return found != s.end() && found->is_string() ? found->get<std::string>() : "?";
+}
 /// What share of the steps `key` counts.
 std::string share(Summary const& s, char const* key) {
   double const steps = number(s, "frames");
@@ -27,7 +43,7 @@ struct Column {
 };
 
 constexpr Column columns[] = {
-    {"scene", [](Summary const& s) { return s.value("scene", std::string("?")); }},
+    {"scene", [](Summary const& s) { return text(s, "scene"); }},
     {"vertices, tets",
      [](Summary const& s) {
        if (s.contains("particles")) {
@@ -42,7 +58,7 @@ constexpr Column columns[] = {
        return done == asked ? fmt::format("{:.0f}", done)
                             : fmt::format("{:.0f} of {:.0f}", done, asked);
      }},
-    {"ended", [](Summary const& s) { return s.value("ended", std::string("?")); }},
+    {"ended", [](Summary const& s) { return text(s, "ended"); }},
     {"contacts, mean (max)",
      [](Summary const& s) {
        if (!s.contains("mean_contacts")) return std::string("no contact");
@@ -54,12 +70,10 @@ constexpr Column columns[] = {
     {"converged", [](Summary const& s) { return share(s, "steps_converged"); }},
     {"cut", [](Summary const& s) { return share(s, "steps_cut"); }},
     {"smallest gap / dhat",
-     [](Summary const& s) {
-       return s.contains("smallest_gap") ? fmt::format("{:.2g}", number(s, "smallest_gap")) : "-";
-     }},
+     [](Summary const& s) { return number_or_dash(s, "smallest_gap", "{:.2g}"); }},
     {"error, m",
-     [](Summary const& s) { return fmt::format("{:.1e}", number(s, "largest_error_estimate_m")); }},
-    {"intersections", [](Summary const& s) { return s.value("intersections", std::string("?")); }},
+     [](Summary const& s) { return number_or_dash(s, "largest_error_estimate_m", "{:.1e}"); }},
+    {"intersections", [](Summary const& s) { return text(s, "intersections"); }},
     {"inverted, steps",
      [](Summary const& s) {
        return fmt::format("{:.0f}", number(s, "steps_with_inverted_elements"));

@@ -130,6 +130,23 @@ TEST_CASE("methods lists every key with its default, and the materials", "[cli]"
     says("methods", 0, part);
 }
 
+TEST_CASE("a run is restarted or replaced, not both", "[cli]") {
+  says("run drag --restart --force", 108, "excludes");
+}
+
+TEST_CASE("a table has a dash for what a run does not know", "[cli]") {
+  test::ScratchFolder const folder;
+  // What is not finite is null.
+  auto const result = folder
+                          .write("summary.json", R"({"scene": "odd", "frames": 2,
+    "frames_asked": 2, "mean_iterations": null, "largest_error_estimate_m": null,
+    "smallest_gap": null, "ended": null})")
+                          .parent_path();
+  test::Outcome const outcome = taut_with("table " + result.string());
+  CHECK(outcome.status == 0);
+  CHECK_THAT(outcome.text, ContainsSubstring("| odd | ") && ContainsSubstring(" | - | - | ? | "));
+}
+
 TEST_CASE("plan says what a step ends by", "[cli]") {
   test::ScratchFolder const folder;
   std::string const scene = folder.write("plain.toml", test::plain_scene).string();
@@ -138,6 +155,9 @@ TEST_CASE("plan says what a step ends by", "[cli]") {
   says("plan " + scene + " --set solver.stopping=energy_drop", 0, "of what the first one did");
   says("plan twist", 0, "not ended after 400 iterations, a stronger one");
   says("plan twist --set solver.strong_cycle=never", 0, "the same however long a step takes");
+  // Edges of 0.5 m, their diagonals in faces: 0.6 m on average.
+  says("plan " + scene + " --set contact.friction=0", 0, " m (0.3 of the mean edge");
+  says("plan " + scene + " --set contact.dhat=0.01", 0, "barrier below 0.01 m,");
   test::Outcome const quasi_static =
       taut_with("plan " + scene + " --set time.integrator=quasi_static");
   CHECK_THAT(quasi_static.text, !ContainsSubstring("wave") && !ContainsSubstring("m/s"));

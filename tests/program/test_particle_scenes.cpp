@@ -525,13 +525,14 @@ TEST_CASE("mistakes in a scene of material points are answered by a sentence", "
   SceneRun const grid("plain.toml", plain_scene, {"output.vdb=true"});
   CHECK_THROWS_MATCHES(run_command(grid.options), Error,
                        MessageMatches(ContainsSubstring("output.vdb writes the grid")));
-  SceneRun const metric("plain.toml", plain_scene, {"solver.preconditioner=multigrid"});
-  CHECK_THROWS_MATCHES(run_command(metric.options), Error,
-                       MessageMatches(ContainsSubstring("needs the nodes of a grid")));
-  SceneRun const method("plain.toml", plain_scene, {"solver.method=hot"});
-  CHECK_THROWS_MATCHES(run_command(method.options), Error,
-                       MessageMatches(ContainsSubstring("is of scenes of material points")));
-  SceneRun const rule("plain.toml", plain_scene, {"solver.stopping=characteristic_norm"});
-  CHECK_THROWS_MATCHES(run_command(rule.options), Error,
-                       MessageMatches(ContainsSubstring("is of scenes of material points")));
+  auto const refuses = [](std::string const& option, std::string const& sentence) {
+    CAPTURE(option);
+    SceneRun const scene("plain.toml", plain_scene, {option});
+    auto const says = MessageMatches(ContainsSubstring(sentence));
+    CHECK_THROWS_MATCHES(run_command(scene.options), Error, says);
+    CHECK_THROWS_MATCHES(plan_command(scene.options.scene), Error, says);
+  };
+  refuses("solver.preconditioner=multigrid", "needs the nodes of a grid");
+  refuses("solver.method=hot", "is of scenes of material points");
+  refuses("solver.stopping=characteristic_norm", "is of scenes of material points");
 }
