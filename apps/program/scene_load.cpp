@@ -106,6 +106,18 @@ Scene resolve_particles(Section const& root, Scene scene) {
   return scene;
 }
 
+/// It names the folder of the result and stands in tables.
+std::string read_name(Section const& root, std::filesystem::path const& file) {
+  std::string const name = root.text("name", file.stem().string());
+  bool const odd = std::any_of(name.begin(), name.end(), [](unsigned char c) {
+    return c == '/' || c == '\\' || c < 0x20 || c == 0x7f;
+  });
+  if (odd || name.empty() || name == "." || name == "..")
+    throw Error("{}: name is '{}', which cannot be the name of a folder: choose another",
+                root.place(), name);
+  return name;
+}
+
 Scene resolve(SceneValue const& document, std::filesystem::path const& file) {
   Section const root(document, "");
   root.allow({"name", "description", "base", "gravity", "resolution", "time", "object", "obstacle",
@@ -113,7 +125,7 @@ Scene resolve(SceneValue const& document, std::filesystem::path const& file) {
               "source"});
   Scene scene;
   scene.file = file;
-  scene.name = root.text("name", file.stem().string());
+  scene.name = read_name(root, file);
   scene.description = root.text("description", "");
   scene.gravity = root.point("gravity", "m/s^2", scene.gravity);
   scene.resolution =

@@ -160,11 +160,19 @@ Section::Section(SceneValue const& table, std::string path)
 }
 
 void Section::allow(std::span<std::string_view const> keys) const {
-  for (auto const& [key, member] : std::get<SceneValue::Table>(table_->value))
-    if (std::find(keys.begin(), keys.end(), key) == keys.end())
-      throw Error("{}: unknown key '{}'{}: {} knows {}", member.place, path(key),
-                  suggestion(", the nearest is '", key, keys, "'"),
-                  path_.empty() ? "a scene" : path_, fmt::join(keys, ", "));
+  for (auto const& [key, member] : std::get<SceneValue::Table>(table_->value)) {
+    if (std::find(keys.begin(), keys.end(), key) != keys.end()) continue;
+    std::string const near = suggestion(", the nearest is '", key, keys, "'");
+    // A change of an entry that is not there has been taken for one of a table in each entry.
+    bool const may_be_name = !names_.empty() && near.empty() && !member.is_inline &&
+                             std::holds_alternative<SceneValue::Table>(member.value);
+    if (may_be_name)
+      throw Error("{}: no {} is called '{}', and none has a table of that name: there {} {}",
+                  member.place, path_.substr(0, path_.find('.')), key,
+                  names_.size() == 1 ? "is" : "are", fmt::join(names_, ", "));
+    throw Error("{}: unknown key '{}'{}: {} knows {}", member.place, path(key), near,
+                path_.empty() ? "a scene" : path_, fmt::join(keys, ", "));
+  }
 }
 
 std::string Section::path(std::string_view key) const {
@@ -229,8 +237,13 @@ std::optional<Section> Section::section(std::string_view key) const {
 
 std::vector<Section> Section::list(std::string_view key) const {
   std::vector<Section> sections;
+  std::vector<std::string> names;
   SceneValue const* value = find(key);
   if (value == nullptr) return sections;
+  // A file would have a list here, which the change would have been merged into.
+  if (value->place.starts_with("--set ") && std::holds_alternative<SceneValue::Table>(value->value))
+    throw Error("{}: the scene has no {} to change: add a [[{}]] to its file", value->place,
+                path(key), path(key));
   for (SceneValue const& entry : read_list(*value, path(key))) {
     SceneValue const* name = entry.find("name");
     std::string const label =
@@ -240,7 +253,9 @@ std::vector<Section> Section::list(std::string_view key) const {
         throw Error("{}: the name '{}' is taken by {}: give every {} a name of its own",
                     entry.place, label, other.where(), key);
     sections.emplace_back(entry, path(key) + "." + label);
+    names.push_back(label);
   }
+  for (Section& section : sections) section.names_ = names;
   return sections;
 }
 

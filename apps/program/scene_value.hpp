@@ -103,6 +103,7 @@ public:
 private:
   SceneValue const* table_;
   std::string path_;
+  std::vector<std::string> names_;  ///< of an entry of an array: those of all entries
 };
 
 }  // namespace taut

@@ -183,6 +183,35 @@ TEST_CASE("a result that is replaced leaves nothing of the old one", "[run]") {
   CHECK(runner.summary().at("frames") == 2);
 }
 
+TEST_CASE("a file of another run is not overwritten, whichever is left", "[run]") {
+  Runner runner;
+  for (std::string const name : {"result.xdmf", "report.jsonl", "summary.json", "checkpoint.h5",
+                                 "obj/frame_00000.obj", "vdb/frame_00001.vdb"}) {
+    CAPTURE(name);
+    runner.options.out = runner.out(fs::path(name).stem().string());
+    write_file_atomically(runner.options.out / name, "mine");
+    runner.refused(name + " of another run is there already: choose another --out or replace it");
+    CHECK(read_file(runner.options.out / name) == "mine");
+    CHECK_FALSE(fs::exists(runner.options.out / "result.vtkhdf"));
+    runner.options.force = true;
+    runner.run({"time.frames=1"});
+    runner.options.force = false;
+    bool const written = fs::exists(runner.options.out / name);
+    CHECK((!written || read_file(runner.options.out / name) != "mine"));
+  }
+}
+
+TEST_CASE("the name of a scene is that of a folder", "[run]") {
+  Runner runner;
+  runner.options.out.clear();
+  for (std::string const name : {"", ".", "..", "../other", "/tmp", "a\nb"}) {
+    CAPTURE(name);
+    std::ofstream(runner.options.scene.scene)
+        << test::replaced(test::plain_scene, "\"plain\"", nlohmann::json(name).dump());
+    runner.refused("cannot be the name of a folder");
+  }
+}
+
 TEST_CASE("check finds inverted elements and the summary counts their steps", "[run]") {
   // A flat start is all inverted, and the first step does not mend all of it.
   Runner runner(test::replaced(test::plain_scene, "material =", "start = \"flat\"\nmaterial ="));

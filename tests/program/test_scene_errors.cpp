@@ -72,6 +72,25 @@ TEST_CASE("unknown keys are refused with the nearest known one") {
   spoilt("y_min", "y_mix", "nearest is 'y_min'");
 }
 
+TEST_CASE("changes of entries that are not there are refused by what is there") {
+  auto const refuses = [](std::string const& text, std::string const& change,
+                          std::string const& sentence) {
+    CHECK_THROWS_MATCHES(load(text, {.overrides = {change}}), Error,
+                         MessageMatches(ContainsSubstring(sentence)));
+  };
+  refuses(plain_scene, "object.zz.material.young=1e5",
+          "--set object.zz.material.young=1e5: no object is called 'zz', and none has a table of "
+          "that name: there is cube");
+  refuses(plain_scene + "[[object]]\nname = \"ball\"\nshape = { kind = \"sphere\" }\n",
+          "object.zz.material.young=1e5", "there are cube, ball");
+  refuses(plain_scene, "object.materil.young=1e5", "the nearest is 'material'");
+  refuses(plain_scene, "object.cube.zz=1", "unknown key 'object.cube.zz'");
+  std::string const free = plain_scene.substr(0, plain_scene.find("[[pin]]"));
+  refuses(free, "pin.clamp.release=0.5",
+          "--set pin.clamp.release=0.5: the scene has no pin to change");
+  refused(free + "[pin]\nname = \"floor\"\n", "pin is a table: it must be a list");
+}
+
 TEST_CASE("values out of range say the range and its unit") {
   spoilt("poisson = 0.4", "poisson = 0.5",
          "scene.toml:11: object.cube.material.poisson is 0.5: it must be above -1 and below 0.5");
