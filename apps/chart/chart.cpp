@@ -54,6 +54,14 @@ std::string field(double number) {
   return std::isfinite(number) ? fmt::format("{:.6g}", number) : std::string();
 }
 
+std::string field(std::string const& text) {
+  bool const plain = text.find_first_of(",\"\n\r") == std::string::npos && !text.starts_with('#');
+  if (plain) return text;
+  std::string quoted = "\"";
+  for (char const c : text) quoted += c == '"' ? std::string("\"\"") : std::string(1, c);
+  return quoted + "\"";
+}
+
 namespace {
 
 /// What would only show after all is measured. Throws Error.
@@ -76,6 +84,16 @@ void check_options(ChartOptions const& options) {
   }
 }
 
+/// What the charts of any kind leave in their folder, data.csv first; pictures if they are drawn.
+std::vector<std::string> files_of_charts(bool drawn) {
+  std::vector<std::string> files{"data.csv", "data.json", "frames.csv", "fields.csv",
+                                 "patterns.csv"};
+  if (!drawn) return files;
+  for (std::string const name : {"chart", "residual", "frames", "fields", "fields_residual"})
+    for (char const* ending : {".svg", ".png"}) files.push_back(name + ending);
+  return files;
+}
+
 }  // namespace
 
 int chart_command(ChartOptions const& options) {
@@ -84,9 +102,11 @@ int chart_command(ChartOptions const& options) {
   std::filesystem::path const out =
       options.out.empty() ? std::filesystem::path("charts") / scene.stem() : options.out;
   std::filesystem::path const data = out / "data.csv";
-  if (!options.force && std::filesystem::exists(data)) {
-    throw Error("{}: a chart is there already: choose another --out or replace it with --force",
-                out.string());
+  for (std::string const& file : files_of_charts(options.draw)) {
+    if (options.force || !std::filesystem::exists(out / file)) continue;
+    throw Error(
+        "{}: a chart is there already ({}): choose another --out or replace it with --force",
+        out.string(), file);
   }
   if (options.sweep + options.stability + options.totals + options.matrices > 1)
     throw Error("--sweep, --stability, --totals and --matrices: choose one");

@@ -119,7 +119,8 @@ private:
         auto const short_of = [&](int k) { return scene.contestant(limited(file, m, k)); };
         linear = linear_iterations(short_of, step, found.points.size(), options_.max_seconds);
       }
-      std::string const label = fmt::format("{},{},{}", name, step.step, all[m].label);
+      std::string const label =
+          fmt::format("{},{},{}", field(name), step.step, field(all[m].label));
       add_rows(label, found, linear);
       add_fields(label, step, *measure, found);
       say(all[m].label, found);

@@ -58,8 +58,15 @@ Json summary(Json const& rows, std::size_t first, std::size_t last, Json const& 
 
 std::vector<std::string> split_row(std::string const& line) {
   std::vector<std::string> fields(1);
-  for (char c : line) {
-    if (c == ',') {
+  bool quoted = false;
+  for (std::size_t k = 0; k < line.size(); ++k) {
+    char const c = line[k];
+    if (c == '"' && quoted && line.substr(k + 1, 1) == "\"") {  // two stand for one
+      fields.back() += c;
+      ++k;
+    } else if (c == '"' && (quoted || fields.back().empty())) {
+      quoted = !quoted;
+    } else if (c == ',' && !quoted) {
       fields.emplace_back();
     } else {
       fields.back() += c;

@@ -47,8 +47,7 @@ struct Endurance {
   void end(std::string how, std::string reason) {
     ended = std::move(how);
     why = std::move(reason);
-    // It is a field of a row.
-    std::replace(why.begin(), why.end(), ',', ';');
+    // A row is one line.
     std::replace(why.begin(), why.end(), '\n', ' ');
   }
 };
@@ -170,9 +169,9 @@ std::string stability_of_policies(std::filesystem::path const& file, ChartOption
     double const turned = most_turns(geometry, e.time);
     bool const inverted = std::isfinite(e.inverted_time);
     table += fmt::format("{},{},{:.6g},{:.4g},{},{},{:.4g},{},{:.3g},{:.4g},{},{}\n",
-                         policies[k].label, e.steps, e.time, turned, field(e.inverted_time),
+                         field(policies[k].label), e.steps, e.time, turned, field(e.inverted_time),
                          inverted ? field(most_turns(geometry, e.inverted_time)) : "", mean,
-                         e.most_contacts, e.smallest_gap, e.seconds, e.ended, e.why);
+                         e.most_contacts, e.smallest_gap, e.seconds, e.ended, field(e.why));
     fmt::print("{:<36} {:>7} {:>7.3g} {:>10.1f} {:>9.3g}  {}{}{}\n", policies[k].label, e.steps,
                turned, mean, e.seconds, e.ended, e.why.empty() ? "" : ": ", e.why);
     std::fflush(stdout);

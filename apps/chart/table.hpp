@@ -37,6 +37,8 @@ std::string describe_target(ChartOptions const& options, bool particles);
 
 /// A number as a field of a row: empty if it is not one.
 std::string field(double number);
+/// A text as a field of a row: in quotes where it would not be one field as it is.
+std::string field(std::string const& text);
 
 /// scene,frame,method,iteration,seconds,position_error,energy_gap,residual,linear_iterations,ended:
 /// a row per iteration; the last row of a method says how it ended (see Trace). Energies are empty
@@ -55,8 +57,8 @@ std::string sweep_methods(std::filesystem::path const& scene, ChartOptions const
 /// scene,method,frames,of_frames,seconds,iterations,linear_iterations,converged_frames,grid_steps,
 /// error_m,ended: a row per scene and method, with the whole scene, by the rule that ends its
 /// steps. `error_m` is the largest distance, at the end, from the scene by its own method with a
-/// thousandth of its tolerance. `ended`: "end of scene", "not converged" (some frames), "out of
-/// time" or "no step" (an error). frames.csv:
+/// thousandth of its tolerance, empty where that has not converged in every frame. `ended`: "end of
+/// scene", "not converged" (some frames), "out of time" or "no step" (an error). frames.csv:
 /// scene,method,frame,seconds,iterations,linear_iterations,grid_steps.
 std::string totals_of_methods(std::filesystem::path const& scene, ChartOptions const& options,
                               std::vector<ChartMethod> const& methods, MoreTables& more);
@@ -77,7 +79,7 @@ std::string patterns_of_matrices(std::filesystem::path const& scene, ChartOption
 /// time at `inverted_...`, empty if never. Turns are those of the pin that turns most.
 std::string stability_of_policies(std::filesystem::path const& scene, ChartOptions const& options);
 
-/// The fields of a row.
+/// The fields of a row, without the quotes of `field`.
 std::vector<std::string> split_row(std::string const& line);
 
 /// The same as JSON: `facts`, `rows` with null for what is empty and, of a comparison, what every

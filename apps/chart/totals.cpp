@@ -21,8 +21,10 @@ struct Total {
   std::vector<FrameCost> costs;
   int iterations = 0, linear_iterations = 0, converged = 0;
   double seconds = 0;
-  std::string ended = "end of scene";
+  std::string ended = whole;
   std::vector<Point> end;
+
+  static constexpr char const* whole = "end of scene";
 };
 
 Total run(ChartScene const& scene, Simulation& simulation, int frames, double max_seconds) {
@@ -73,12 +75,19 @@ public:
   std::string description() const { return steps_->description(); }
   Scene const& scene() const { return scene_; }
 
-  /// The rows.
-  std::string run(std::string& costs) const {
+  /// The rows. Adds to the costs of frames, and to `header` what errors are measured from.
+  std::string run(std::string& costs, std::string& header, bool alone) const {
     auto const solver = steps_->whole(exact_);
     constexpr double patience = 20;  // for it, in times of the methods' seconds
     Total const reference =
         taut::run(*steps_, *solver, scene_.frames, patience * options_.max_seconds);
+    bool const accurate = reference.ended == Total::whole;
+    header +=
+        fmt::format("# {}reference = {}, {} of {} frames, {}\n", alone ? "" : scene_.name + " ",
+                    exact_.solver.text("method"), reference.frames, scene_.frames, reference.ended);
+    if (!accurate)
+      fmt::print(stderr, "taut: {}: the reference has {}: no errors\n", scene_.name,
+                 reference.ended);
     fmt::print("{}: {}, {} frames\n{:<26} {:>8} {:>10} {:>11} {:>11} {:>11}  ended\n", scene_.name,
                steps_->size(), scene_.frames, "", "frames", "seconds", "iterations", "linear",
                "error, m");
@@ -90,17 +99,17 @@ public:
       for (std::size_t f = 0; f < total.costs.size(); ++f) {
         FrameCost const& cost = total.costs[f];
         grid_steps += cost.grid_steps;
-        costs += fmt::format("{},{},{},{},{},{},{}\n", scene_.name, one.label, f + 1,
+        costs += fmt::format("{},{},{},{},{},{},{}\n", field(scene_.name), field(one.label), f + 1,
                              field(cost.seconds), cost.iterations, cost.linear_iterations,
                              cost.grid_steps);
       }
-      bool const comparable = !total.end.empty() && !reference.end.empty();
+      bool const comparable = !total.end.empty() && accurate;
       double const error = comparable ? largest_distance(total.end, reference.end)
                                       : std::numeric_limits<double>::quiet_NaN();
-      rows += fmt::format("{},{},{},{},{},{},{},{},{},{},{}\n", scene_.name, one.label,
-                          total.frames, scene_.frames, field(total.seconds), total.iterations,
-                          total.linear_iterations, total.converged, grid_steps, field(error),
-                          total.ended);
+      rows += fmt::format("{},{},{},{},{},{},{},{},{},{},{}\n", field(scene_.name),
+                          field(one.label), total.frames, scene_.frames, field(total.seconds),
+                          total.iterations, total.linear_iterations, total.converged, grid_steps,
+                          field(error), total.ended);
       fmt::print("{:<26} {:>8} {:>10.4g} {:>11} {:>11} {:>11}  {}\n", one.label, total.frames,
                  total.seconds, total.iterations, total.linear_iterations,
                  comparable ? fmt::format("{:.2e}", error) : "-", total.ended);
@@ -139,7 +148,7 @@ std::string totals_of_methods(std::filesystem::path const& file, ChartOptions co
   }
   std::string rows, &costs = more["frames.csv"];
   costs = "scene,method,frame,seconds,iterations,linear_iterations,grid_steps\n";
-  for (Totals const& one : scenes) rows += one.run(costs);
+  for (Totals const& one : scenes) rows += one.run(costs, header, scenes.size() == 1);
   return header +
          "scene,method,frames,of_frames,seconds,iterations,linear_iterations,converged_frames,"
          "grid_steps,error_m,ended\n" +

@@ -3,6 +3,7 @@
 #include <taut/apps/program/methods.hpp>
 
 #include <catch2/catch_test_macros.hpp>
+#include <catch2/generators/catch_generators.hpp>
 #include <catch2/matchers/catch_matchers_exception.hpp>
 #include <catch2/matchers/catch_matchers_string.hpp>
 
@@ -120,6 +121,70 @@ TEST_CASE("a chart that is there stays, unless forced", "[chart]") {
   CHECK(read_file(options.out / "data.csv") == "mine");
   options.force = true;
   CHECK(!chart(options).rows.empty());
+}
+
+TEST_CASE("a chart leaves every file of another one, unless forced", "[chart]") {
+  test::ScratchFolder const folder;
+  ChartOptions options = options_for(folder, test::plain_scene);
+  options.methods = {"newton"};
+  auto const refused = [&](std::string const& name) {
+    CAPTURE(name);
+    options.out = folder.path() / ("of_" + name);
+    write_file_atomically(options.out / name, "mine");
+    CHECK_THROWS_MATCHES(chart_command(options), Error,
+                         MessageMatches(ContainsSubstring("(" + name + ")")));
+    CHECK(read_file(options.out / name) == "mine");
+    CHECK_FALSE(std::filesystem::exists(options.out / "data.csv"));
+  };
+  for (char const* name : {"data.json", "frames.csv", "fields.csv", "patterns.csv"}) refused(name);
+  options.draw = true;
+  for (char const* name : {"chart.svg", "chart.png", "residual.png", "fields_residual.svg"}) {
+    refused(name);
+  }
+  // Pictures that are not drawn are none of its own.
+  options.draw = false;
+  CHECK(!chart(options).rows.empty());
+  CHECK(read_file(options.out / "fields_residual.svg") == "mine");
+}
+
+TEST_CASE("a scene may have commas and quotes in its name", "[chart]") {
+  CHECK(split_row("1,,\"a, \"\"b\"\"\",x = \"y\",\"\"") ==
+        std::vector<std::string>{"1", "", "a, \"b\"", "x = \"y\"", ""});
+  test::ScratchFolder const folder;
+  std::string const name = GENERATE("a, \"b\"", "# a = b");
+  ChartOptions options =
+      options_for(folder, test::replaced(test::plain_scene, "\"plain\"", "'" + name + "'"));
+  options.methods = {"newton"};
+  for (bool const totals : {false, true}) {
+    CAPTURE(totals);
+    options.totals = totals;
+    if (totals) options.frames = {};
+    Data const data = chart(options);
+    REQUIRE(!data.rows.empty());
+    CHECK(data.rows.front().at("scene") == name);
+    CHECK(data.rows.front().at("method") == "Newton");
+    CHECK(number(data.rows.front(), totals ? "frames" : "frame") == (totals ? 4 : 2));
+    options.force = true;
+  }
+}
+
+TEST_CASE("totals have no errors where the reference has not converged", "[chart]") {
+  test::ScratchFolder const folder;
+  ChartOptions options = options_for(folder, test::plain_scene);
+  options.frames = {};
+  options.totals = true;
+  options.methods = {"newton"};
+  Data const good = chart(options);
+  CHECK_THAT(good.header, ContainsSubstring("# reference = dk, 4 of 4 frames, end of scene\n"));
+  CHECK(number(good.rows.at(0), "error_m") < 1e-2);
+  // Enough iterations for the tolerance of the methods, but not for a thousandth of it.
+  options.force = true;
+  options.scene.changes.overrides = {"solver.max_iterations=3"};
+  options.methods = {"newton:max_iterations=100"};
+  Data const bad = chart(options);
+  CHECK_THAT(bad.header, ContainsSubstring("# reference = dk, 4 of 4 frames, not converged\n"));
+  CHECK(bad.rows.at(0).at("ended") == "end of scene");
+  CHECK(bad.rows.at(0).at("error_m").empty());
 }
 
 TEST_CASE("methods of a chart are named with their options", "[chart]") {
