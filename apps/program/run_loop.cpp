@@ -54,7 +54,9 @@ std::vector<std::filesystem::path> left_by_a_run(std::filesystem::path const& fo
   for (std::string const kind : {"obj", "vdb"}) {
     for (auto const& entry : std::filesystem::directory_iterator(folder / kind, none)) {
       std::string const name = entry.path().filename().string();
-      if (name.starts_with("frame_") && name.ends_with("." + kind)) files.push_back(entry.path());
+      if (entry.is_regular_file(none) && name.starts_with("frame_") && name.ends_with("." + kind)) {
+        files.push_back(entry.path());
+      }
     }
   }
   return files;
