@@ -18,6 +18,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdint>
 #include <utility>
 #include <vector>
 
@@ -36,30 +37,44 @@ struct KineticSums {
   }
 };
 
-/// How much the pull at what sleeps has changed, against how much there was: what the predictor
-/// asks for over h^2, and which unknowns are fixed. The first time (`first`) it is noted alone.
+/// What pulls at unknowns at rest at x: what the predictor asks for over h^2.
 template <class P, class S>
-struct CompareLoads {
+struct PullAtRest {
   VectorField<typename P::position, S> x, predictor;
-  FixedMask<S> fixed, fixed_before;
+  FixedMask<S> fixed;
+  double time_step;
+  KOKKOS_FUNCTION Vec3<double> operator()(int i) const {
+    if (fixed(i)) return {};
+    return 1 / (time_step * time_step) * (load3<double>(predictor, i) - load3<double>(x, i));
+  }
+};
+
+/// Pull, and which unknowns are fixed, where a body falls asleep.
+template <class P, class S>
+struct NoteLoads {
+  PullAtRest<P, S> now;
+  FixedMask<S> fixed;
   VectorField<double, S> pull;
   typename Bodies<S>::Indices body;
-  Kokkos::View<int*, typename S::memory> noted;  ///< per body
-  double time_step;
+  Kokkos::View<int*, typename S::memory> falls;
+  KOKKOS_FUNCTION void operator()(int i) const {
+    if (!falls(body(i))) return;
+    store3(pull, i, now(i));
+    fixed(i) = now.fixed(i);
+  }
+};
+
+/// How much the pull at what sleeps has changed since, against how much there is.
+template <class P, class S>
+struct CompareLoads {
+  PullAtRest<P, S> now;
+  FixedMask<S> fixed;
+  VectorField<double, S> pull;
   KOKKOS_FUNCTION void operator()(int i, Sums<double, 2>& sums) const {
-    Vec3<double> a{};
-    if (!fixed(i)) {
-      a = 1 / (time_step * time_step) * (load3<double>(predictor, i) - load3<double>(x, i));
-    }
-    if (noted(body(i))) {
-      Vec3<double> const change = a - load3<double>(pull, i);
-      sums[0] += fixed(i) == fixed_before(i) ? dot(change, change)
-                                             : Kokkos::Experimental::infinity_v<double>;
-      sums[1] += dot(a, a);
-    } else {
-      store3(pull, i, a);
-      fixed_before(i) = fixed(i);
-    }
+    Vec3<double> const a = now(i), change = a - load3<double>(pull, i);
+    sums[0] +=
+        fixed(i) == now.fixed(i) ? dot(change, change) : Kokkos::Experimental::infinity_v<double>;
+    sums[1] += dot(a, a);
   }
 };
 
@@ -136,8 +151,16 @@ public:
     }
   }
 
-  /// Before a step by h from x, once terms know of it: wakes what has reason to, and lays the
-  /// predictor of what has none back to x.
+  /// What a run that goes on needs to know.
+  struct Record {
+    std::vector<int> quiet;  ///< slow steps in a row, per body
+    std::vector<int> noted;  ///< per body: asleep, and pull and fixed are known
+    std::vector<double> pull;
+    std::vector<int> fixed;
+  };
+
+  /// Before a step from x, once terms know of it: wakes what has reason to, and lays the predictor
+  /// of what has none back to x. `h` is the one whose square is the factor of energies.
   template <class Potential>
   void lie(Potential& potential, Positions const& x, Positions const& predictor, double h) {
     if (!params_.on) return;
@@ -149,23 +172,32 @@ public:
   }
 
   /// After it: who has moved is awake, who was slow comes closer to sleep, and what falls asleep
-  /// stands still.
-  template <class Potential, class State>
-  void settle(Potential& potential, State const& state) {
+  /// stands still. Its loads are noted now, under those of this step: they may change in the next.
+  /// `predict()` gives the predictor of a step as this one from where all is now; it is asked only
+  /// if something falls asleep.
+  template <class Potential, class State, class Predict>
+  void settle(Potential& potential, State const& state, double h, Predict const& predict) {
     if (!params_.on) return;
-    if constexpr (DivisibleObjective<Potential>) look(potential, state);
+    if constexpr (DivisibleObjective<Potential>) look(potential, state, h, predict);
   }
 
-  /// Bodies that slept through the last step.
-  int asleep() const {
-    int count = 0;
-    for (char n : noted_) count += n != 0;
-    return count;
+  /// For checkpoints, between two steps.
+  Record record() const {
+    if (bodies_.of.extent(0) == 0) return record_;
+    Record now{quiet_, {noted_.begin(), noted_.end()}, {}, {}};
+    auto const pull = Kokkos::create_mirror_view_and_copy(Kokkos::HostSpace(), pull_);
+    auto const fixed = Kokkos::create_mirror_view_and_copy(Kokkos::HostSpace(), fixed_);
+    for (int i = 0; i < pull.extent_int(0); ++i) {
+      for (int c = 0; c < 3; ++c) now.pull.push_back(pull(i, c));
+      now.fixed.push_back(fixed(i));
+    }
+    return now;
   }
-
-  /// For checkpoints: quiet steps of each body.
-  std::vector<int> const& quiet() const { return quiet_; }
-  void set_quiet(std::vector<int> quiet) { quiet_ = std::move(quiet); }
+  /// Goes on from there, from the next step on.
+  void restore(Record record) {
+    record_ = std::move(record);
+    bodies_ = {};
+  }
 
 private:
   template <class Potential>
@@ -173,13 +205,14 @@ private:
     prepare(potential);
     find_islands(potential, x);
     if (moves(potential, x)) std::fill(quiet_.begin(), quiet_.end(), 0);
-    send([&](int b) { return noted_[b]; });
     auto const sums = sums_.template sum<2>(
-        "sleep_loads", kernels::CompareLoads<P, S>{x, predictor, potential.fixed(), fixed_, pull_,
-                                                   bodies_.of, flag_, h});
+        "sleep_loads",
+        kernels::CompareLoads<P, S>{{x, predictor, potential.fixed(), h}, fixed_, pull_});
     for (int b = 0; b < bodies_.count; ++b) {
       constexpr double same = 1e-20;  // squared; an unchanged pull is the same to the last bit
       if (noted_[b] && sums[2 * b] > same * sums[2 * b + 1]) quiet_[b] = 0;
+      // Quiet for long, but in an island that was not: its loads are to be noted first.
+      if (!noted_[b]) quiet_[b] = std::min(quiet_[b], params_.steps - 1);
     }
     std::vector<char> asleep(bodies_.count);
     std::vector<char> const resting = resting_islands();
@@ -194,8 +227,8 @@ private:
     potential.set_asleep(std::move(asleep));
   }
 
-  template <class Potential, class State>
-  void look(Potential& potential, State const& state) {
+  template <class Potential, class State, class Predict>
+  void look(Potential& potential, State const& state, double h, Predict const& predict) {
     auto const of_moved =
         sums_.template sum<2>("sleep_moved", kernels::CountMoved<P, S>{state.x_last, state.x});
     std::vector<double> const moved(of_moved.begin(), of_moved.end());
@@ -210,10 +243,22 @@ private:
       quiet_[b] = slow && !woken ? std::min(quiet_[b] + 1, params_.steps) : 0;
     }
     std::vector<char> const resting = resting_islands();
-    send([&](int b) { return resting[label_[b]] && !noted_[b]; });
-    for_each<S>(
-        "fall_asleep", state.x.extent_int(0),
-        kernels::StandStill<P, S>{state.x, state.v, state.x_last, state.v_last, bodies_.of, flag_});
+    bool any = false;
+    auto const falls = [&](int b) { return resting[label_[b]] && !noted_[b]; };
+    for (int b = 0; b < bodies_.count; ++b) any = any || falls(b);
+    if (any) {
+      send(falls);
+      for_each<S>("fall_asleep", state.x.extent_int(0),
+                  kernels::StandStill<P, S>{state.x, state.v, state.x_last, state.v_last,
+                                            bodies_.of, flag_});
+      for_each<S>(
+          "note_loads", state.x.extent_int(0),
+          kernels::NoteLoads<P, S>{
+              {state.x, predict(), potential.fixed(), h}, fixed_, pull_, bodies_.of, flag_});
+      for (int b = 0; b < bodies_.count; ++b) {
+        if (falls(b)) noted_[b] = 1;
+      }
+    }
     potential.set_asleep({});
   }
 
@@ -230,8 +275,32 @@ private:
     fixed_ = FixedMask<S>("sleep_fixed", potential.size());
     flag_ = Kokkos::View<int*, typename S::memory>("sleep_flag", bodies_.count);
     host_flag_ = Kokkos::create_mirror_view(flag_);
+    take_up(potential.size());
+  }
+  /// What has been restored, or that all is awake.
+  void take_up(int unknowns) {
+    Record const from = std::exchange(record_, {});
+    bool const known = static_cast<int>(from.quiet.size()) == bodies_.count &&
+                       static_cast<int>(from.noted.size()) == bodies_.count &&
+                       static_cast<int>(from.fixed.size()) == unknowns &&
+                       from.pull.size() == 3 * from.fixed.size();
+    if (!from.quiet.empty() && !known) {
+      throw Error("sleep: what is to go on is of {} bodies and {} unknowns, not of {} and {}",
+                  from.quiet.size(), from.fixed.size(), bodies_.count, unknowns);
+    }
     noted_.assign(bodies_.count, 0);
-    if (static_cast<int>(quiet_.size()) != bodies_.count) quiet_.assign(bodies_.count, 0);
+    quiet_.assign(bodies_.count, 0);
+    if (!known) return;
+    quiet_ = from.quiet;
+    noted_.assign(from.noted.begin(), from.noted.end());
+    auto const pull = Kokkos::create_mirror_view(pull_);
+    auto const fixed = Kokkos::create_mirror_view(fixed_);
+    for (int i = 0; i < unknowns; ++i) {
+      for (int c = 0; c < 3; ++c) pull(i, c) = from.pull[3 * i + c];
+      fixed(i) = static_cast<std::uint8_t>(from.fixed[i]);
+    }
+    assign(pull_, pull);
+    assign(fixed_, fixed);
   }
   template <class Potential>
   void find_islands(Potential& potential, Positions const& x) {
@@ -274,6 +343,7 @@ private:
   std::vector<int> label_;   ///< island of each body where the step began
   std::vector<int> quiet_;   ///< slow steps in a row
   std::vector<char> noted_;  ///< asleep: its pull is known
+  Record record_;            ///< to go on from, until the next step begins
 };
 
 }  // namespace taut

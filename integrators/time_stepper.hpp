@@ -197,8 +197,9 @@ public:
   }
 
   Minimiser& minimiser() { return minimiser_; }
-  /// Who sleeps; its quiet steps belong to a checkpoint.
+  /// Who sleeps; its record belongs to a checkpoint.
   Sleep<Precision, Space>& sleep() { return sleep_; }
+  Sleep<Precision, Space> const& sleep() const { return sleep_; }
   /// Where the last minimisation ended, m: what the state is now, unless the step was refused.
   Positions const& reached() const { return x_; }
 
@@ -214,14 +215,17 @@ private:
     }
     auto& inertia = potential.template term<Inertia<Precision, Space>>();
     inertia.switch_on(R::inertia);
-    for_each<Space>("inertial_target", n,
-                    kernels::InertialTarget<Precision, Space>{state, inertia.target(), x_, r.a0,
-                                                              r.a1, h * r.b0, h * r.b1});
-    potential.begin_step(state.x, r.scale * (R::inertia ? h * h : 1.0), h * std::sqrt(r.scale),
-                         R::inertia);
+    auto const aim = [&] {
+      for_each<Space>("inertial_target", n,
+                      kernels::InertialTarget<Precision, Space>{state, inertia.target(), x_, r.a0,
+                                                                r.a1, h * r.b0, h * r.b1});
+    };
+    double const time_step = h * std::sqrt(r.scale);
+    aim();
+    potential.begin_step(state.x, r.scale * (R::inertia ? h * h : 1.0), time_step, R::inertia);
     potential.predict(x_);
     if (R::inertia) {
-      sleep_.lie(potential, state.x, x_, h);
+      sleep_.lie(potential, state.x, x_, time_step);
       rigid_predictor_.start(potential, state, x_);
     }
     start(potential, state);
@@ -233,7 +237,16 @@ private:
     if (report.stop == Stop::non_finite) return report;
     for_each<Space>("finish_step", n,
                     kernels::FinishStep<Precision, Space>{state, x_, r.c / h, r.c0 / h, r.c1 / h});
-    if (R::inertia) sleep_.settle(potential, state);
+    if (R::inertia) {
+      bool predicted = false;
+      sleep_.settle(potential, state, time_step, [&] {
+        predicted = true;
+        aim();
+        potential.predict(x_);
+        return x_;
+      });
+      if (predicted) assign_on<Space>(x_, state.x);  // what has been reached, again
+    }
     Kokkos::fence("taut: step");
     state.time += h;
     state.last_step = h;

@@ -103,7 +103,14 @@ public:
     checkpoint.set("last_step", std::vector<double>{state_.last_step});
     checkpoint.set("steps", std::vector<std::int32_t>{state_.steps});
     for (auto const& [name, field] : fields()) checkpoint.set(name, flat(field));
-    if (sleep().on) checkpoint.set("quiet_steps", quiet_);
+    if (sleep().on) {
+      auto const record =
+          scene_.scheme == TimeScheme::bdf2 ? bdf2_.sleep().record() : euler_.sleep().record();
+      checkpoint.set("quiet_steps", record.quiet);
+      checkpoint.set("sleep_noted", record.noted);
+      checkpoint.set("sleep_pull", record.pull);
+      checkpoint.set("sleep_fixed", record.fixed);
+    }
     if (contact_) {
       save_field(checkpoint, "contact_activation", contact_->activation());
       for (std::size_t k = 0; k < formulas_.size(); ++k) {
@@ -134,9 +141,14 @@ public:
       assign(field, host);
     }
     if (sleep().on) {
-      quiet_ = checkpoint.get<std::int32_t>("quiet_steps");
-      euler_.sleep().set_quiet(quiet_);
-      bdf2_.sleep().set_quiet(quiet_);
+      typename Sleep<P, DefaultSpace>::Record const record{
+          checkpoint.get<std::int32_t>("quiet_steps"), checkpoint.get<std::int32_t>("sleep_noted"),
+          checkpoint.get<double>("sleep_pull"), checkpoint.get<std::int32_t>("sleep_fixed")};
+      if (scene_.scheme == TimeScheme::bdf2) {
+        bdf2_.sleep().restore(record);
+      } else {
+        euler_.sleep().restore(record);
+      }
     }
     if (contact_) {
       contact_->set_activation(
@@ -539,7 +551,6 @@ private:
     auto const run = [&](auto& stepper) {
       NewtonReport const report = stepper.step(potential_, state_, h, observer);
       reached_ = stepper.reached();
-      quiet_ = stepper.sleep().quiet();
       return report;
     };
     switch (scene_.scheme) {
@@ -606,7 +617,6 @@ private:
   ProgramPotential<P> potential_;
   State<P> state_;
   Positions reached_;  ///< by the last minimisation, also where the step was then refused
-  std::vector<std::int32_t> quiet_;  ///< steps in a row, per body; of sleep
   Vectors forces_;
   typename FixedMask<DefaultSpace>::HostMirror fixed_;
   typename Positions::HostMirror prescribed_;

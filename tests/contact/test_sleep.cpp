@@ -161,6 +161,39 @@ TEST_CASE("a body on the ground sleeps until it is pulled otherwise, fixed or pu
   }
 }
 
+TEST_CASE("a pin that is released right after a body fell asleep wakes it", "[sleep]") {
+  int const steps = 5;
+  Cubes scene({.on = true, .speed = 1e-3, .steps = steps});
+  scene.pull({0, -9.81, 0});
+  auto const& unknowns = scene.body.unknowns;
+  for (std::size_t i = 0; i < scene.object.size(); ++i) {
+    for (int c = 0; c < 3; ++c) unknowns.prescribed(i, c) = scene.state.x(i, c);
+    unknowns.fixed(i) = scene.object[i] == 2;
+  }
+  // It falls asleep at the end of the last of these: no step has seen it asleep.
+  for (int step = 0; step < steps; ++step) CHECK(scene.step().asleep == 0);
+  SECTION("released") {
+    for (std::size_t i = 0; i < scene.object.size(); ++i) unknowns.fixed(i) = 0;
+    scene.step();
+    CHECK(scene.fastest(2) > 0.02);
+  }
+  SECTION("held on") {
+    scene.step();
+    scene.step();
+    CHECK(scene.stepper.sleep().record().noted[2] == 1);
+    CHECK(scene.fastest(2) == 0);
+  }
+}
+
+TEST_CASE("a load that begins right after a body fell asleep wakes it", "[sleep]") {
+  int const steps = 5;
+  Cubes scene({.on = true, .speed = 1e-3, .steps = steps});
+  for (int step = 0; step < steps; ++step) CHECK(scene.step().asleep == 0);
+  scene.pull({0, 9.81, 0});
+  CHECK(scene.step().asleep == 0);
+  CHECK(scene.fastest(2) > 0.02);
+}
+
 TEST_CASE("a restarted run sleeps on bitwise", "[sleep]") {
   Sleep<Fp64, DefaultSpace>::Params const params{.on = true, .speed = 2e-3, .steps = 8};
   // The state three steps before all are asleep, to go on from.
@@ -169,7 +202,7 @@ TEST_CASE("a restarted run sleeps on bitwise", "[sleep]") {
   again.pull({0, -9.81, 0});
   struct Saved {
     State<Fp64> state;
-    std::vector<int> quiet;
+    Sleep<Fp64, DefaultSpace>::Record sleep;
   };
   auto const copy = [](State<Fp64> const& from, State<Fp64>& to) {
     assign(to.x, from.x);
@@ -184,19 +217,30 @@ TEST_CASE("a restarted run sleeps on bitwise", "[sleep]") {
   int asleep = 0;
   for (int step = 0; step < 400 && asleep < 3; ++step) {
     asleep = whole.step().asleep;
-    saved.push_back({State<Fp64>(whole.state.size()), whole.stepper.sleep().quiet()});
+    saved.push_back({State<Fp64>(whole.state.size()), whole.stepper.sleep().record()});
     copy(whole.state, saved.back().state);
   }
   REQUIRE(asleep == 3);
   Saved const& from = saved[saved.size() - 4];
   copy(from.state, again.state);
-  again.stepper.sleep().set_quiet(from.quiet);
+  again.stepper.sleep().restore(from.sleep);
   for (int step = 0; step < 3; ++step) asleep = again.step().asleep;
   CHECK(asleep == 3);
   for (int k : {0, 1, 2}) CHECK(whole.positions(k) == again.positions(k));
   // And stands still from then on, in both.
   whole.step(), again.step();
   for (int k : {0, 1, 2}) CHECK(whole.positions(k) == again.positions(k));
+
+  // A restart in a step that pulls otherwise: what sleeps knows how it was pulled at before.
+  Cubes third(params);
+  copy(whole.state, third.state);
+  third.stepper.sleep().restore(whole.stepper.sleep().record());
+  for (Cubes* s : {&whole, &third}) {
+    s->pull({0, 9.81, 0});
+    CHECK(s->step().asleep == 0);
+    CHECK(s->fastest(0) > 0.02);
+  }
+  for (int k : {0, 1, 2}) CHECK(whole.positions(k) == third.positions(k));
 }
 
 TEST_CASE("sleep without a speed is refused", "[sleep]") {

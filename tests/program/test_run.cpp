@@ -170,6 +170,44 @@ TEST_CASE("a restart may take another solver, and says so", "[run]") {
                                  "from step 2 on: solver.method = \"newton\", it was not set"});
 }
 
+TEST_CASE("what sleeps over a restart wakes as it would have without one", "[run]") {
+  // Held by the pin, the first cube falls asleep after three steps; the pin goes, or a force comes,
+  // just where the run goes on.
+  std::string const scene = test::plain_scene + R"(
+[[object]]
+name = "other"
+shape = { kind = "box", size = [1, 1, 1], resolution = 2 }
+translate = [5, 0, 0]
+material = { young = 1e5, poisson = 0.4, density = 1000 }
+
+[[force]]
+start = 0.03
+acceleration = [1, 0, 0]
+
+[contact]
+
+[solver]
+sleep_speed = 0.1
+sleep_steps = 3
+)";
+  for (std::string const scheme : {"implicit_euler", "bdf2"}) {
+    INFO(scheme);
+    Runner runner(test::replaced(scene, "gravity = [0, -10, 0]", "gravity = [0, 0, 0]"));
+    std::string const by = "time.integrator=" + scheme;
+    runner.run({by});
+    ResultReader const whole = runner.result();
+    runner.options.out = runner.out("legs");
+    runner.run({by, "time.frames=3"});
+    runner.run({by}, true);
+    ResultReader const legs = runner.result();
+    REQUIRE(legs.frames() == 5);
+    CHECK(legs.positions(3) == legs.positions(2));
+    CHECK(legs.positions(4) != legs.positions(3));
+    CHECK(legs.positions(4) == whole.positions(4));
+    CHECK(legs.velocities(4) == whole.velocities(4));
+  }
+}
+
 TEST_CASE("a result that is replaced leaves nothing of the old one", "[run]") {
   Runner runner;
   runner.run({"output.obj=true"});
