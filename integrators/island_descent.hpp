@@ -33,6 +33,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <utility>
 #include <vector>
 
 namespace taut {
@@ -62,6 +63,7 @@ public:
         scale_(e.scale()),
         clock_(preconditioner.refresh()),
         ledger_(e, islands, rule, position_noise(x)),
+        past_(ledger_.count()),
         report_(ledger_.report()) {}
 
   MinimiserReport run() {
@@ -145,7 +147,7 @@ private:
     double gradient = 0;
     bool finite = true;
     ledger_.for_each_working([&](Island& island) {
-      finite = finite && std::isfinite(island.dots.g1_P1_g1);
+      finite = finite && std::isfinite(island.descent);
       gradient += island.gradient;
       if (finite && !ledger_.ends_by_gradient(island)) weigh(island);
     });
@@ -154,7 +156,7 @@ private:
     direct(Turn::renew);
     bool uphill = false;
     ledger_.for_each_working([&](Island& island) {
-      bool const descends = island.dots.g_p <= -safeguard_.least_descent * island.dots.g1_P1_g1;
+      bool const descends = island.direction <= -safeguard_.least_descent * island.descent;
       if (!safeguard_.on || island.steepest || descends) return;
       ++report_.restarts.not_descent;
       island.restarted = island.steepest = uphill = true;
@@ -168,26 +170,31 @@ private:
   kernels::PreconditionedGradient<P, S> preconditioned() const {
     return {fields_.gradient, fields_.gradient_before, preconditioner_.curvature(), {}, {}};
   }
-  /// Scalar products of each island; with the last direction, of those bodies that keep it.
+  /// Scalar products of each island; those that betas are made of, of the bodies that keep their
+  /// last direction, at both ends of the step, whatever island they were of.
   void products() {
     using Dot = kernels::ConjugateDots<P, S>;
     auto const sums = islands_.sums().template sum<Dot::count>(
         "island_dots", Dot{preconditioned(), fields_.direction, fields_.mass});
     ledger_.for_each_working([&](Island& island) {
-      Dots const last = island.dots;
-      island.dots = {.g_P_g = last.g1_P1_g1, .g_p = last.g_p, .p_p = last.p_p, .g_g = last.g1_g1};
-      island.dots.alpha = island.factor * step_.length;
-      island.gradient = 0;
+      island.dots = {.alpha = island.factor * step_.length};
+      island.descent = island.gradient = 0;
       island.steepest = true;
     });
     ledger_.for_each_working_body([&](int b, Island& island) {
       auto const of = [&](int k) { return double(sums[std::size_t(Dot::count) * b + k]); };
       Dots& d = island.dots;
-      d.g1_P1_g1 += of(Dot::g_P_g);
-      d.g1_g1 += of(Dot::g_g);
+      Dots const last = std::exchange(past_[b], {.g_P_g = of(Dot::g_P_g), .g_g = of(Dot::g_g)});
+      island.descent += of(Dot::g_P_g);
       island.gradient += of(Dot::g_Minv_g);
       if (ledger_.fresh(b)) return;
       island.steepest = false;
+      d.g_P_g += last.g_P_g;
+      d.g_g += last.g_g;
+      d.g_p += last.g_p;
+      d.p_p += last.p_p;
+      d.g1_P1_g1 += of(Dot::g_P_g);
+      d.g1_g1 += of(Dot::g_g);
       d.g1_P1_y += of(Dot::g_P_y);
       d.y_P1_y += of(Dot::y_P_y);
       d.g_P1_g += of(Dot::before_P_before);
@@ -227,12 +234,12 @@ private:
     auto const sums = islands_.sums().template sum<Update::count>(
         "island_direction", Update{preconditioned(), fields_.direction, fields_.mass,
                                    islands_.bodies().of, islands_.turns()});
-    ledger_.for_each_working(
-        [](Island& island) { island.dots.g_p = island.dots.p_p = island.metric = 0; });
+    ledger_.for_each_working([](Island& island) { island.direction = island.metric = 0; });
     ledger_.for_each_working_body([&](int b, Island& island) {
       auto const of = [&](int k) { return double(sums[std::size_t(Update::count) * b + k]); };
-      island.dots.g_p += of(Update::g_p);
-      island.dots.p_p += of(Update::p_p);
+      past_[b].g_p = of(Update::g_p);
+      past_[b].p_p = of(Update::p_p);
+      island.direction += of(Update::g_p);
       island.metric += of(Update::p_M_p);
     });
   }
@@ -247,13 +254,13 @@ private:
     slope_ = form_ = 0;
     bool finite = true;
     ledger_.for_each_working([&](Island& island) {
-      finite = finite && std::isfinite(island.dots.g_p) && std::isfinite(island.form);
+      finite = finite && std::isfinite(island.direction) && std::isfinite(island.form);
       // With inertia p'Hp >= p'Mp, unless that is lost to round-off.
       double const curvature = std::max(island.form, island.metric);
       island.restarted = island.cut = false;
       island.stiffest = std::max(island.stiffest, curvature / island.metric);
-      island.factor = double(typename P::real(-island.dots.g_p / curvature));
-      island.slope = island.factor * island.dots.g_p;
+      island.factor = double(typename P::real(-island.direction / curvature));
+      island.slope = island.factor * island.direction;
       island.form = island.factor * island.factor * curvature;
       island.attainable = -0.5 * island.slope;
       slope_ += island.slope;
@@ -277,7 +284,8 @@ private:
   /// there; returns how far d is known to be valid. One island alone is left to the line search.
   double confine() {
     constexpr int most = 8;
-    double const fraction = StepBound().fraction, wanted = 1 / fraction;
+    double const fraction = bound_fraction(), wanted = 1 / fraction;
+    if (!std::isfinite(fraction)) return 0;  // the line search asks for no bound
     int moving = 0;
     ledger_.for_each_working([&](Island const& island) { moving += island.slope != 0; });
     for (int round = 0; moving > 1 && round < most; ++round) {
@@ -300,6 +308,11 @@ private:
       scale_direction();
     }
     return 0;
+  }
+  /// The share of a bound that the line search goes.
+  double bound_fraction() const {
+    if constexpr (requires { search_.bound(); }) return search_.bound().fraction;
+    return StepBound().fraction;
   }
   /// Of what the last bound was cut by, the bodies forget their past; their island, if that is
   /// known.
@@ -411,6 +424,7 @@ private:
   double largest_decrement_ = 0;
   StallWatch watch_;
   IslandLedger<E, Rule> ledger_;
+  std::vector<Dots> past_;  ///< per body: where its last step began
   MinimiserReport& report_;
 };
 

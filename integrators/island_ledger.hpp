@@ -18,10 +18,12 @@ struct Island {
   int unknowns = 0;
   double mass = 0;         ///< of what is free, kg
   Stop stop = Stop::none;  ///< none: it is at work
-  double error = 0;        ///< m, where it stopped by its gradient
+  double error = 0;        ///< m, where it has stopped
 
-  Dots dots;
-  double gradient = 0;  ///< g' M^-1 g
+  Dots dots;             ///< of those of its bodies that keep their past
+  double descent = 0;    ///< g'Pg
+  double gradient = 0;   ///< g' M^-1 g
+  double direction = 0;  ///< g'p
   double beta = 0, gamma = 0;
   bool restarted = true;       ///< the past of all of its bodies is forgotten
   bool steepest = true;        ///< p = -P g on all of them
@@ -63,7 +65,8 @@ public:
     }
     island_.assign(count, {});
     rules_.assign(count, rule);
-    for (int i = 0; i < count; ++i) found(i);
+    for (Rule& own : rules_) own.start(scale_);
+    found(std::vector<char>(count, 1));
     report_.bodies = count;
     report_.islands = 0;
     report_.active = 0;
@@ -136,7 +139,7 @@ public:
   /// An island that has nothing to gain has ended; true then.
   bool ends_by_gradient(Island& island) {
     double const least = rules_[&island - island_.data()].negligible();
-    if (island.dots.g1_P1_g1 > 0 && 0.5 * island.gradient > least) return false;
+    if (island.descent > 0 && 0.5 * island.gradient > least) return false;
     island.stop = Stop::converged_by_gradient;
     island.error = std::sqrt(island.gradient / island.mass);
     return true;
@@ -192,8 +195,7 @@ public:
     for (int i = 0; i < count(); ++i) {
       Island const& island = island_[i];
       if (island.bodies == 0 || island.unknowns == 0) continue;
-      bool const by_gradient = island.stop == Stop::converged_by_gradient;
-      double const own = by_gradient ? island.error : rules_[i].error_estimate();
+      double const own = island.works() ? rules_[i].error_estimate() : island.error;
       square += island.mass * own * own;
     }
     return square > 0 ? std::sqrt(square / scale_.mass) : 0;
@@ -220,25 +222,31 @@ private:
     bool fresh = false;  ///< its past is forgotten
   };
 
-  /// Counts what island `i` consists of, and begins anew to judge it.
-  void found(int i) {
-    Island& island = island_[i];
-    island.bodies = island.unknowns = 0;
-    island.mass = island.error = 0;
-    bool sleeps = !asleep_.empty();
-    for (int b = i; b < count(); ++b) {
-      if (islands_(b) != i) continue;
-      ++island.bodies;
-      island.mass += body_[b].mass;
-      island.unknowns += body_[b].unknowns;
-      sleeps = sleeps && asleep_[b];
+  /// Counts what the islands that have `changed` consist of, and begins anew to judge them.
+  void found(std::vector<char> const& changed) {
+    std::vector<char> sleeps(count(), !asleep_.empty());
+    for (int i = 0; i < count(); ++i) {
+      if (!changed[i]) continue;
+      island_[i].bodies = island_[i].unknowns = 0;
+      island_[i].mass = island_[i].error = 0;
     }
-    Scale own = scale_;
-    own.mass = island.mass;
-    rules_[i].start(own);
-    // What has nothing free is done, and so is what sleeps.
-    bool const done = island.unknowns == 0 || sleeps;
-    island.stop = done ? Stop::converged_by_gradient : Stop::none;
+    for (int b = 0; b < count(); ++b) {
+      int const i = islands_(b);
+      if (!changed[i]) continue;
+      ++island_[i].bodies;
+      island_[i].mass += body_[b].mass;
+      island_[i].unknowns += body_[b].unknowns;
+      sleeps[i] = sleeps[i] && asleep_[b];
+    }
+    for (int i = 0; i < count(); ++i) {
+      if (!changed[i]) continue;
+      Scale own = scale_;
+      own.mass = island_[i].mass;
+      resume_rule(rules_[i], own);
+      // What has nothing free is done, and so is what sleeps.
+      bool const done = island_[i].unknowns == 0 || sleeps[i];
+      island_[i].stop = done ? Stop::converged_by_gradient : Stop::none;
+    }
   }
 
   bool merge() {
@@ -250,6 +258,7 @@ private:
       changed[i] = 1;
       // Both have their last direction, but each by a factor of its own: one is kept.
       if (island_[before].factor != island_[i].factor) body_[b].fresh = true;
+      if (island_[before].bodies > 0) join_rule(rules_[i], rules_[before]);
       island_[before].bodies = 0;
     }
     bool woken = false;
@@ -260,9 +269,7 @@ private:
       woken = body_[b].fresh = true;
       report_.woken += islands_.previous(b) == b && body_[b].unknowns > 0;
     }
-    for (int i = 0; i < count(); ++i) {
-      if (changed[i]) found(i);
-    }
+    found(changed);
     return woken;
   }
 
@@ -273,7 +280,9 @@ private:
             .floor = floor_of(island)};
   }
   void check(Island& island, Progress const& progress) {
-    island.stop = rules_[&island - island_.data()].check(progress);
+    Rule& rule = rules_[&island - island_.data()];
+    island.stop = rule.check(progress);
+    island.error = rule.error_estimate();
     if (progress.stuck && island.works()) island.stop = Stop::stalled;
   }
   double floor_of(Island const& island) const {

@@ -195,6 +195,8 @@ public:
   NewtonStep() : NewtonStep(Params()) {}
   explicit NewtonStep(Params const& params) : params_(params) {}
 
+  StepBound const& bound() const { return params_.bound; }
+
   template <class E>
   Step operator()(Line<E>& line, double first) const {
     Step step = params_.bound.first_step(line, first);
@@ -221,6 +223,8 @@ public:
   };
   SufficientDecrease() : SufficientDecrease(Params()) {}
   explicit SufficientDecrease(Params const& params) : params_(params) {}
+
+  StepBound const& bound() const { return params_.bound; }
 
   template <class E>
   Step operator()(Line<E>& line, double first) const {
@@ -256,6 +260,8 @@ public:
   };
   ExactLineSearch() : ExactLineSearch(Params()) {}
   explicit ExactLineSearch(Params const& params) : params_(params) {}
+
+  StepBound const& bound() const { return params_.bound; }
 
   /// Doubles the step until the slope has changed its sign, then secant steps (regula falsi with
   /// Illinois weights). A slope that is not a number lies beyond a barrier.

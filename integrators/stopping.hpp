@@ -29,6 +29,7 @@
 #include <cmath>
 #include <concepts>
 #include <tuple>
+#include <utility>
 #include <vector>
 
 namespace taut {
@@ -69,12 +70,30 @@ concept GradientRule = Stopping<R> &&
   { rule.judge(e, g) } -> std::same_as<Stop>;
 };
 
+// A rule that is relative to the first step may also have `join(part)` and `resume(scale)`: where
+// two islands become one within a minimisation, it stays relative to the first step of the part
+// that had more to do, and begins the rest anew, for the mass of both.
+template <class R>
+void join_rule(R& rule, R const& part) {
+  if constexpr (requires { rule.join(part); }) rule.join(part);
+}
+template <class R>
+void resume_rule(R& rule, Scale const& scale) {
+  if constexpr (requires { rule.resume(scale); }) {
+    rule.resume(scale);
+  } else {
+    rule.start(scale);
+  }
+}
+
 /// The sum over the last steps, and the error that it predicts.
 class ErrorEstimate {
 public:
   /// At least so many steps are summed, and at most `longest`.
   explicit ErrorEstimate(int window = 8)
-      : least_(std::size_t(std::max(window, 1))), decrements_(std::max(least_, longest)) {}
+      : least_(std::size_t(std::max(window, 1))), most_(std::max(least_, longest)) {
+    decrements_.reserve(most_);
+  }
 
   void start(Scale const& scale) {
     scale_ = scale;
@@ -93,11 +112,11 @@ public:
     double const attainable = std::abs(progress.attainable);
     if (progress.stuck) {
       window_ = least_;
-      std::fill_n(decrements_.begin(), window_, attainable);
+      decrements_.assign(window_, attainable);
       count_ = window_;
       conclusive_ = true;
     } else {
-      decrements_[count_++ % decrements_.size()] = attainable;
+      put(attainable);
       adapt();
       conclusive_ = conclusive_ && !progress.shortened;
     }
@@ -146,11 +165,19 @@ private:
     if (!(fall <= 0.5)) return all;
     return std::max(sum(0, least_), late * fall / (1 - fall));
   }
+  void put(double decrement) {
+    std::size_t const at = count_++ % most_;
+    if (at < decrements_.size()) {
+      decrements_[at] = decrement;
+    } else {
+      decrements_.push_back(decrement);
+    }
+  }
   /// Steps from the last but `begin` back to the last but `end`.
   double sum(std::size_t begin, std::size_t end) const {
     double total = 0;
     for (std::size_t k = begin; k < end; ++k) {
-      total += decrements_[(count_ - 1 - k) % decrements_.size()];
+      total += decrements_[(count_ - 1 - k) % most_];
     }
     return total;
   }
@@ -166,7 +193,7 @@ private:
     if (!conclusive_ || window_ == 1) return;
     conclusive_ = falls(window_, 0.5);
     if (!conclusive_) {
-      window_ = std::min(2 * window_, decrements_.size());
+      window_ = std::min(2 * window_, most_);
     } else if (falls(window_, much_less)) {
       window_ = std::max(window_ / 2, least_);
     }
@@ -176,8 +203,9 @@ private:
     return sum(0, window / 2) <= share * sum(window / 2, window);
   }
 
-  std::size_t least_, window_ = least_;
-  std::vector<double> decrements_;  ///< a ring
+  std::size_t least_, most_, window_ = least_;
+  /// A ring of `most_`, made as steps come: a copy of a rule that has not begun is small.
+  std::vector<double> decrements_;
   std::size_t count_ = 0;
   bool conclusive_ = false;
   double curvature_ = 1;
@@ -248,7 +276,13 @@ public:
   void start(Scale const& scale) {
     ErrorEstimate::start(scale);
     steps_ = 0;
+    first_ = 0;
   }
+  void join(EnergyDrop const& part) {
+    first_ = std::max(first_, part.first_);
+    steps_ = std::max(steps_, part.steps_);
+  }
+  void resume(Scale const& scale) { ErrorEstimate::start(scale); }
   Stop check(Progress const& progress) {
     add(progress);
     if (steps_++ == 0) first_ = progress.decrement;
@@ -281,6 +315,8 @@ public:
     ErrorEstimate::start(scale);
     unit_ = params_.relative ? 0 : scale.length;
   }
+  void join(GradientNorm const& part) { unit_ = std::max(unit_, part.unit_); }
+  void resume(Scale const& scale) { ErrorEstimate::start(scale); }
   Stop check(Progress const& progress) {
     add(progress);
     if (unit_ == 0) unit_ = progress.gradient_norm;
@@ -308,6 +344,15 @@ public:
   }
   void forget() {
     std::apply([](Rules&... rule) { (rule.forget(), ...); }, rules_);
+  }
+  void join(AnyOf const& part) {
+    [&]<std::size_t... k>(std::index_sequence<k...>) {
+      (join_rule(std::get<k>(rules_), std::get<k>(part.rules_)), ...);
+    }
+    (std::index_sequence_for<Rules...>());
+  }
+  void resume(Scale const& scale) {
+    std::apply([&](Rules&... rule) { (resume_rule(rule, scale), ...); }, rules_);
   }
   Stop check(Progress const& progress) {
     Stop stop = Stop::none;

@@ -19,6 +19,10 @@ public:
   explicit AnyLineSearch(Params const& params)
       : search_(make_one_of<SufficientDecrease, NewtonStep, ExactLineSearch>(params)) {}
 
+  StepBound const& bound() const {
+    return std::visit([](auto const& search) -> StepBound const& { return search.bound(); },
+                      search_);
+  }
   template <class E>
   Step operator()(Line<E>& line, double first) const {
     return std::visit([&](auto const& search) { return search(line, first); }, search_);
@@ -45,6 +49,12 @@ public:
   }
   void forget() {
     std::visit([](auto& rule) { rule.forget(); }, rule_);
+  }
+  void join(OneOfStoppings const& part) {
+    std::visit([&]<class Rule>(Rule& rule) { join_rule(rule, std::get<Rule>(part.rule_)); }, rule_);
+  }
+  void resume(Scale const& scale) {
+    std::visit([&](auto& rule) { resume_rule(rule, scale); }, rule_);
   }
   double error_estimate() const {
     return std::visit([](auto const& rule) { return rule.error_estimate(); }, rule_);

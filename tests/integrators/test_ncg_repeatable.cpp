@@ -15,12 +15,12 @@ using namespace taut;
 namespace {
 
 // More unknowns than one run of a sum, so that threads share the work.
-constexpr toy::ChainParams params{.size = 3000};
+constexpr toy::ChainParams long_chain{.size = 3000};
 
 /// All positions after 25 iterations.
 template <class Method>
 std::vector<double> result() {
-  toy::Chain<toy::Barrier, typename Method::Precision, typename Method::Space> chain(params);
+  toy::Chain<toy::Barrier, typename Method::Precision, typename Method::Space> chain(long_chain);
   auto const x = chain.start();
   typename Method::Params method;
   method.stop.tolerance = 0;
@@ -28,7 +28,7 @@ std::vector<double> result() {
   Method(method).minimise(chain, x);
   auto const host = Kokkos::create_mirror_view_and_copy(Kokkos::HostSpace(), x);
   std::vector<double> values;
-  for (int i = 0; i < params.size; ++i)
+  for (int i = 0; i < long_chain.size; ++i)
     for (int c = 0; c < 3; ++c) values.push_back(double(host(i, c)));
   return values;
 }

@@ -179,6 +179,41 @@ TEST_CASE("gradient norms are absolute or relative") {
   CHECK(relative.check(progress) == Stop::converged_by_gradient);
 }
 
+TEST_CASE("where two islands become one, rules stay relative to the larger first step") {
+  EnergyDrop drop({.tolerance = 1e-2}), part = drop;
+  drop.start({}), part.start({});
+  drop.check(step(1));
+  part.check(step(8));
+  join_rule(drop, part);
+  resume_rule(drop, {});
+  CHECK(std::isinf(drop.error_estimate()));  // the window begins anew
+  CHECK(drop.check(step(0.09)) == Stop::none);
+  CHECK(drop.check(step(0.07)) == Stop::converged_by_energy_drop);
+
+  using Either = AnyOf<GradientNorm, DecrementWindow>;
+  Either::Params params;
+  std::get<0>(params.rules) = {.tolerance = 1e-2, .relative = true};
+  Either norm(params), other = norm;
+  norm.start({}), other.start({});
+  Progress progress = step(1);
+  progress.gradient_norm = 2;
+  norm.check(progress);
+  progress.gradient_norm = 5;
+  other.check(progress);
+  join_rule(norm, other);
+  resume_rule(norm, {});
+  progress.gradient_norm = 0.06;
+  CHECK(norm.check(progress) == Stop::none);
+  progress.gradient_norm = 0.04;
+  CHECK(norm.check(progress) == Stop::converged_by_gradient);
+  // Nothing to be relative to: it begins anew.
+  DecrementWindow window, more = window;
+  window.start({}), more.start({});
+  join_rule(window, more);
+  resume_rule(window, {});
+  CHECK(std::isinf(window.error_estimate()));
+}
+
 TEST_CASE("any of several rules stops, and each can be switched off") {
   using Rules = AnyOf<DecrementWindow, EnergyDrop>;
   Rules::Params params;
