@@ -92,7 +92,7 @@ public:
                     kernels::BeginSlip<Space, Precision>{views_, boundaries_, start, unknowns_.mass,
                                                          params_.steepness});
     double const error = params_.settled * unknowns_.length / start.time_step;
-    negligible_ = 0.5 * start.mean_mass * nodes_ * error * error;
+    negligible_ = 0.5 * start.free_mass * error * error;
   }
   bool relag(Positions const& x) const {
     if (!views_.friction && !views_.separates) return false;

@@ -248,12 +248,15 @@ struct MeanCurvature {
   }
 };
 
+/// Mass and number of what is free.
 template <class S, class Precision>
 struct FreeMass {
   FixedMask<S> fixed;
   Array<typename Precision::real, S> mass;
-  KOKKOS_FUNCTION void operator()(int i, Sums<double, 1>& sum) const {
-    if (!fixed(i)) sum[0] += double(mass(i));
+  KOKKOS_FUNCTION void operator()(int i, Sums<double, 2>& sum) const {
+    if (fixed(i)) return;
+    sum[0] += double(mass(i));
+    sum[1] += 1;
   }
 };
 
@@ -316,15 +319,16 @@ public:
   void begin_step(Positions const& x, double scale, double time_step, bool has_inertia) {
     scale_ = scale;
     kernels::FreeMass<Space, Precision> const free_mass{unknowns_.fixed, unknowns_.mass};
-    double const mass = mass_reducer_.template sum<1>("free_mass", size(), free_mass)[0];
+    auto const sums = mass_reducer_.template sum<2>("free_mass", size(), free_mass);
+    double const mass = sums[0], mean_mass = sums[1] > 0 ? mass / sums[1] : 0;
     step_ = {mass, unknowns_.length, time_step, has_inertia};
     if constexpr ((SteppedTerm<Terms> || ...)) {
       bool anyone = false;
       for_each_of<is_stepped>([&](auto const& term) { anyone = anyone || !holds_nothing(term); });
       if (!anyone) return;
       auto const stiffness = stiffness_of_untold(x);  // and their gradient, in direction_
-      StepStart<Precision, Space> const start{x,      time_step,     stiffness,  direction_,
-                                              scale_, mass / size(), has_inertia};
+      StepStart<Precision, Space> const start{x,      time_step, stiffness,   direction_,
+                                              scale_, mean_mass, has_inertia, mass};
       for_each_of<is_stepped>([&](auto const& term) { term.begin_step(start); });
     }
   }
@@ -584,7 +588,7 @@ private:
   void make_room() {
     direction_ = direction_memory_.resize("prescribed_direction", size());
     reducer_.provide(size(), 1);
-    mass_reducer_.provide(size(), 1);
+    mass_reducer_.provide(size(), 2);
   }
   /// The chained kernels of all local terms.
   auto locals() const {

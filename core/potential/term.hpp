@@ -81,16 +81,19 @@ concept SweptTerm = requires(
 template <class Precision, class S>
 struct StepStart {
   VectorField<typename Precision::position, S> x;  ///< where it starts, m
-  double time_step = 0;                            ///< h, s
+  /// s: h for implicit Euler, h sqrt(c) for a rule whose energies have the factor c h^2 (BDF2 with
+  /// steps alike: 2/3 h).
+  double time_step = 0;
   /// What resists a motion of each unknown, N/m: a third of the trace of its block in the Hessian
   /// of all terms that are not told (with inertia, m / h^2 and what is elastic), at x.
   Array<typename Precision::real, S> stiffness;
   /// The gradient, at x, of all terms that are not told, times `scale`: of the energy in J as
   /// gradients of a potential are of theirs. Zero where fixed. Lasts while the step begins.
   VectorField<typename Precision::real, S> gradient = {};
-  double scale = 0;      ///< h^2, or 1 where there is no inertia
-  double mean_mass = 0;  ///< of an unknown, kg
+  double scale = 0;      ///< the square of time_step, or 1 where there is no inertia
+  double mean_mass = 0;  ///< of an unknown that is free, kg
   bool has_inertia = true;
+  double free_mass = 0;  ///< of all that is free, kg
 };
 
 /// A term that is told when a step begins. It may then become another function of x, and must not
