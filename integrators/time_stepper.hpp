@@ -119,19 +119,24 @@ struct StartDirection {
   }
 };
 
+/// Goes along the direction that the bound was of: in mixed precision that is not quite the way to
+/// the predictor. Pins land exactly.
 template <class Precision, class Space>
 struct Start {
   using Position = typename Precision::position;
+  using Real = typename Precision::real;
   FixedMask<Space> fixed;
   VectorField<Position, Space> from, prescribed, x;  ///< x holds the predictor
+  VectorField<Real, Space> direction;
   double fraction;
   KOKKOS_FUNCTION void operator()(int i) const {
+    constexpr bool rounded = sizeof(Real) < sizeof(Position);
     for (int c = 0; c < 3; ++c) {
-      double const to = fixed(i) ? double(prescribed(i, c)) : double(x(i, c));
-      x(i, c) =
-          fraction >= 1
-              ? static_cast<Position>(to)
-              : static_cast<Position>(double(from(i, c)) + fraction * (to - double(from(i, c))));
+      if (fraction < 1 || (rounded && !fixed(i))) {
+        x(i, c) = static_cast<Position>(double(from(i, c)) + fraction * double(direction(i, c)));
+      } else if (fixed(i)) {
+        x(i, c) = prescribed(i, c);
+      }
     }
   }
 };
@@ -266,7 +271,7 @@ private:
     if (prescribed) fraction = potential.max_prescribed_step(state.x, direction_, fraction);
     for_each<Space>("start", state.size(),
                     kernels::Start<Precision, Space>{unknowns.fixed, state.x, unknowns.prescribed,
-                                                     x_, fraction});
+                                                     x_, direction_, fraction});
     if (prescribed) potential.advance(fraction);
   }
 

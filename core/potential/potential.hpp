@@ -198,20 +198,20 @@ struct PrescribedDirection {
   }
 };
 
+/// Goes along the p that the bound was of.
 template <class S, class Precision>
 struct MovePrescribed {
   FixedMask<S> fixed;
   VectorField<typename Precision::position, S> x, prescribed;
+  VectorField<typename Precision::real, S> p;
   double fraction;
   KOKKOS_FUNCTION void operator()(int i) const {
     if (!fixed(i)) return;
     for (int c = 0; c < 3; ++c) {
       // The last step lands exactly.
-      x(i, c) =
-          fraction >= 1
-              ? prescribed(i, c)
-              : static_cast<typename Precision::position>(
-                    double(x(i, c)) + fraction * (double(prescribed(i, c)) - double(x(i, c))));
+      x(i, c) = fraction >= 1 ? prescribed(i, c)
+                              : static_cast<typename Precision::position>(
+                                    double(x(i, c)) + fraction * double(p(i, c)));
     }
   }
 };
@@ -482,8 +482,8 @@ public:
       throw HeldUp(what_obstructs(x, direction_));
     }
     for_each<Space>("move_prescribed", size(),
-                    kernels::MovePrescribed<Space, Precision>{unknowns_.fixed, x,
-                                                              unknowns_.prescribed, fraction});
+                    kernels::MovePrescribed<Space, Precision>{
+                        unknowns_.fixed, x, unknowns_.prescribed, direction_, fraction});
     advance(fraction);
     return true;
   }

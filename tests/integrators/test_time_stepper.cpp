@@ -6,6 +6,7 @@
 #include <taut/integrators/time_stepper.hpp>
 
 #include <catch2/catch_test_macros.hpp>
+#include <catch2/generators/catch_generators.hpp>
 #include <catch2/matchers/catch_matchers_floating_point.hpp>
 
 #include <array>
@@ -130,6 +131,69 @@ TEST_CASE("a step returns its minimiser's own report") {
   auto const report = stepper.step(potential, state, 0.1);
   STATIC_REQUIRE(std::same_as<std::decay_t<decltype(report)>, NewtonReport>);
   CHECK(report.linear_iterations > 0);
+}
+
+TEST_CASE("a step starts along the direction that its bound was of", "[stepper]") {
+  // In mixed precision that is not all of the way to the predictor. Pins land exactly.
+  using InMixed = Potential<Inertia<Mixed>, StencilTerm<Anchor, Mixed>>;
+  struct Bounded : InMixed {
+    using InMixed::InMixed;
+    double bound = 1;
+    std::array<double, 6> p{};
+    double max_step(Positions const&, Vectors const& direction, double) {
+      for (int k = 0; k < 6; ++k) p[k] = double(direction(k / 3, k % 3));
+      return bound;
+    }
+  };
+  double const bound = GENERATE(0.5, 1.0);
+  CAPTURE(bound);
+  std::vector<double> const mass{2, 2};
+  Unknowns<Mixed> const unknowns(mass, 1);
+  Bounded potential(unknowns, Inertia<Mixed>(unknowns),
+                    StencilTerm<Anchor, Mixed>(Anchor{0}, {{0}, {1}}, 2));
+  potential.bound = bound;
+  State<Mixed> state(2);
+  for (int k = 0; k < 6; ++k) {
+    state.x(k / 3, k % 3) = 0.1 * k;
+    state.v(k / 3, k % 3) = 1.0 / (3 + k);
+    unknowns.prescribed(k / 3, k % 3) = 0.1 * k + 0.7 / (5 + k);
+  }
+  unknowns.fixed(1) = 1;
+  using Idle = Newton<Direct, Identity, SufficientDecrease, DecrementWindow, Mixed>;
+  ImplicitEuler<Idle> stepper(Idle::Params{.budget = {.max_iterations = 0}});
+  stepper.step(potential, state, 0.1);
+  for (int k = 0; k < 6; ++k) {
+    bool const lands = k >= 3 && bound == 1;
+    double const to = lands ? unknowns.prescribed(1, k % 3) : 0.1 * k + bound * potential.p[k];
+    CHECK(state.x(k / 3, k % 3) == to);
+  }
+}
+
+TEST_CASE("terms are told the mean mass of what is free", "[stepper]") {
+  struct Told : Anchors {
+    using Anchors::Anchors;
+    double* mean;
+    double* all;
+    void begin_step(StepStart<Fp64, DefaultSpace> const& start) const {
+      *mean = start.mean_mass;
+      *all = start.free_mass;
+    }
+  };
+  std::vector<double> const mass{2, 4, 30};
+  Unknowns<Fp64> const unknowns(mass, 1);
+  Told told(Anchor{1}, {{0}}, 3);
+  double mean = 0, all = 0;
+  told.mean = &mean;
+  told.all = &all;
+  Potential<Inertia<Fp64>, Told> potential(unknowns, Inertia<Fp64>(unknowns), told);
+  unknowns.fixed(2) = 1;
+  State<Fp64> const state(3);
+  potential.begin_step(state.x, 1, 1, true);
+  CHECK(mean == 3);
+  CHECK(all == 6);
+  for (int i = 0; i < 3; ++i) unknowns.fixed(i) = 1;
+  potential.begin_step(state.x, 1, 1, true);
+  CHECK(mean == 0);
 }
 
 TEST_CASE("a step that ends in what is not a number leaves the state as it was") {
