@@ -12,11 +12,12 @@ namespace taut {
 struct ObstacleCarry {
   Mat3<double> turn = identity3<double>();
   Vec3<double> along{0, 0, 0};
-  Vec3<double> centre{0, 0, 0};  ///< at the start of the step, m
+  Vec3<double> centre{0, 0, 0};             ///< now, m
+  Mat3<double> back = identity3<double>();  ///< from how it is turned now to the start of the step
 
-  /// How far a point of it goes that is at x at the start, m.
+  /// How far a point of it goes that is at x now, m.
   KOKKOS_INLINE_FUNCTION Vec3<double> operator()(Vec3<double> const& x) const {
-    Vec3<double> const w = x - centre;
+    Vec3<double> const w = back * (x - centre);
     return turn * w - w + along;
   }
 };

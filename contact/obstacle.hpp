@@ -192,7 +192,8 @@ public:
     state_->enter(start.x);
     state_->look_at_gaps(start.x);
     FaceMotion const& motion = state_->track.motion();
-    state_->carry = {turn_matrix(motion.turn), motion.along, state_->table.faces.origin};
+    state_->carry = {turn_matrix(motion.turn), motion.along};
+    state_->begun = state_->track.pose().rotation;
     if constexpr (AdaptiveRule<Stiffness_>) {
       Stiffness_& rule = state_->table.rule;
       if (!rule.adapts()) return;
@@ -205,6 +206,9 @@ public:
   void lag(Positions const& x, kernels::FrictionMatrix<Space> const& mu,
            LaggedContacts<Precision, Space>& to) const {
     using Kernel = kernels::LagFace<Barrier, Table, Precision, Space>;
+    // Within the step, what is at x now was elsewhere on the way that it goes.
+    state_->carry.centre = state_->table.faces.origin;
+    state_->carry.back = state_->begun * transpose(state_->track.pose().rotation);
     to.append("obstacle_lag", vertices() * Shape::max_faces,
               Kernel{table(), x, state_->object, mu, state_->carry});
   }
@@ -264,6 +268,7 @@ private:
     Table table;
     ObstacleTrack track;
     ObstacleCarry carry;                           ///< in the step that has begun
+    Mat3<double> begun = identity3<double>();      ///< how it was turned then
     typename SurfaceViews<Space>::Indices object;  ///< per vertex of the mesh
     bool anew = true;  ///< nothing is known yet of what the obstacle holds
     double start_share;

@@ -4,6 +4,7 @@
 
 #include <support/threads.hpp>
 #include <taut/contact/friction.hpp>
+#include <taut/contact/obstacle.hpp>
 #include <taut/core/potential/potential.hpp>
 #include <taut/core/sparse/operations.hpp>
 
@@ -416,6 +417,46 @@ TEST_CASE("contacts stay those of the lag point until they are lagged anew", "[f
   CHECK(f.friction.relag(far));  // there were contacts
   CHECK_FALSE(f.friction.relag(far));
   CHECK(f.friction.value(f.x, 1) == 0);
+}
+
+TEST_CASE("what turns with an obstacle does not slip, wherever its contacts are taken",
+          "[friction]") {
+  Squashed const scene;
+  double const dhat = 0.05, angle = 0.3;
+  Unknowns<Fp64> const unknowns(std::vector<double>(scene.x.size(), 1), 0.5);
+  double lowest = std::numeric_limits<double>::infinity();
+  for (Point const& x : scene.x) lowest = std::min(lowest, x[1]);
+  // A plate that turns about an axis far from the bodies, and rises.
+  Vec3<double> const axis{-3, lowest - 0.5 * dhat, 1}, along{0.2, 0.1, -0.1};
+  Obstacle<HalfSpace, Normalised<LogBarrier>, GivenStiffness, Fp64> const plate(
+      unknowns, scene.surface, scene.rest, HalfSpace{axis},
+      {.dhat = dhat, .stiffness = {.pressure = pressure}});
+  Friction<Fp64> friction(unknowns, scene.rest, {.stick_speed = stick_speed});
+  friction.add(plate, 0.4);
+  RigidPose pose{turn_matrix({{0, 1, 0}, angle})};
+  pose.translation = axis + along - pose.rotation * axis;
+  plate.move_to(pose);
+  auto const from = soups::to_field<double, DefaultSpace>(scene.x);
+  plate.begin_step({from, time_step, {}});
+  friction.begin_step({from, time_step, {}});
+  CHECK(friction.report(from).sliding > 0);
+  std::vector<Point> turned;
+  for (Point const& x : scene.x) {
+    Vec3<double> const y = pose({x[0], x[1], x[2]});
+    turned.push_back({y[0], y[1], y[2]});
+  }
+  auto const to = soups::to_field<double, DefaultSpace>(turned);
+  auto const rests = [&] {
+    FrictionReport const report = friction.report(to);
+    CHECK(report.contacts > 0);
+    CHECK(report.sliding == 0);
+    CHECK_THAT(report.work, WithinAbs(0, 1e-12 * report.limit));
+  };
+  rests();
+  plate.advance(0.4);
+  plate.advance(1);
+  CHECK(friction.relag(to));
+  rests();
 }
 
 TEST_CASE("friction that has no size is refused", "[friction]") {
