@@ -32,6 +32,7 @@ public:
       using Minimiser = Lbfgs<AnyPreconditioner, AnyLineSearch, AnyStopping, P, Space>;
       typename Minimiser::Params params;
       params.lbfgs.window = options_.integer("history");
+      params.lbfgs.forget_when_renewed = options_.flag("forget");
       return hold<Minimiser>(params);
     }
     if (method == "chebyshev") {
@@ -88,6 +89,7 @@ private:
     params.preconditioner = preconditioner();
     if constexpr (requires { params.linear.max_iterations; }) {
       params.linear.max_iterations = options_.integer("max_linear_iterations");
+      params.linear.flexible = options_.flag("flexible");
     }
     params.forcing.largest = options_.number("linear_tolerance");
     params.stop = stopping_of(options_, 1);

@@ -82,6 +82,27 @@ TEST_CASE("L-BFGS keeps as many pairs as history says", "[options]") {
   CHECK_THROWS_AS(solver({"history=21"}), Error);
 }
 
+TEST_CASE("L-BFGS forgets its pairs where forget says so", "[options]") {
+  auto const run = [](std::string const& forget) {
+    return first_step("scrambled_flat", {"method=lbfgs", "refresh=lagged", "refresh_every=5",
+                                         "stopping=budget", "max_iterations=12", forget})
+        .x;
+  };
+  CHECK(run("forget=true") != run("forget=false"));
+}
+
+TEST_CASE("Newton's conjugate gradients are flexible where flexible says so", "[options]") {
+  for (std::string const hessian : {"assembled", "matrix_free"}) {
+    INFO(hessian);
+    auto const run = [&](std::string const& flexible) {
+      return first_step("drag", {"method=newton", "hessian=" + hessian, flexible});
+    };
+    Outcome const plain = run("flexible=false"), flexible = run("flexible=true");
+    CHECK(flexible.report.converged());
+    CHECK(flexible.x != plain.x);  // another formula, of the same numbers but for round-off
+  }
+}
+
 TEST_CASE("Chebyshev's rho is measured where it is 0", "[options]") {
   auto const run = [](std::string const& rho) {
     return first_step("drag", {"method=chebyshev", "chebyshev_rho=" + rho}).report;
