@@ -47,6 +47,7 @@ public:
     write(state_.x, geometry.start, mesh_.points);
     write(state_.v, geometry.velocity, std::vector<Point>(size()));
     refuse_forbidden_inversion();
+    refuse_many_motions();
   }
 
   NewtonReport step(IterationObserver const& observer) override {
@@ -426,18 +427,34 @@ private:
   }
 
   /// What never moves has one mark. Every other pin and obstacle has one of its own, as long as
-  /// there are any left: those of one mark are not kept apart.
+  /// there are any left: those of one mark are not kept apart, which contact must not be given.
   class Marks {
   public:
+    static constexpr int of_motions = std::numeric_limits<std::uint8_t>::max() - 1;
     std::uint8_t next(RigidMotion const& motion) {
-      if (motion.phases.empty()) return 1;
-      if (last_ < std::numeric_limits<std::uint8_t>::max()) ++last_;
+      if (motion.phases.empty()) return still;
+      if (last_ - still < of_motions) ++last_;
       return last_;
     }
 
   private:
-    std::uint8_t last_ = 1;
+    static constexpr std::uint8_t still = 1;
+    std::uint8_t last_ = still;
   };
+  void refuse_many_motions() const {
+    if (!scene_.contact) return;
+    auto const pins = std::count_if(geometry_.pins.begin(), geometry_.pins.end(),
+                                    [](Pin const& pin) { return !pin.motion.phases.empty(); });
+    int obstacles = 0;
+    for_each_surface([&](ObstacleSurface const& surface, std::int32_t) {
+      obstacles += !scene_.obstacles[surface.obstacle].motion.phases.empty();
+    });
+    if (pins + obstacles <= Marks::of_motions) return;
+    throw Error(
+        "{}: {} pins and {} obstacles of triangles move, and contact keeps no more than {} of them "
+        "apart: make one pin of those that move alike (a list of selections), or let fewer move",
+        scene_.file.string(), pins, obstacles, Marks::of_motions);
+  }
 
   /// Pins and forces of the step that ends at time t.
   void prescribe(double t, double h) {

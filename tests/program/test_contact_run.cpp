@@ -130,6 +130,28 @@ TEST_CASE("policies that are not compiled together are refused by name", "[conta
   }
 }
 
+TEST_CASE("more motions than contact keeps apart are refused", "[contact]") {
+  auto const scene = [](int moving) {
+    std::string text =
+        replaced(plain_scene, "resolution = 2 }",
+                 "resolution = 1 }\ncopies = { count = [255, 1, 1], step = [2, 0, 0] }");
+    text += "[contact]\n";
+    for (int k = 0; k < moving; ++k) {
+      text += fmt::format(
+          "[[pin]]\nname = \"p{0}\"\nobject = \"cube-{0}\"\nselect = {{ side = \"y_max\" }}\n"
+          "motion = [{{ name = \"up\", velocity = [0, 0.1, 0] }}]\n",
+          k);
+    }
+    return text;
+  };
+  ContactRun most(scene(254), {"time.frames=1"}), more(scene(255), {"time.frames=1"});
+  CHECK(run_command(most.options) == 0);
+  CHECK_THROWS_MATCHES(
+      run_command(more.options), Error,
+      MessageMatches(ContainsSubstring("255 pins and 0 obstacles") &&
+                     ContainsSubstring("no more than 254") && ContainsSubstring("make one pin")));
+}
+
 TEST_CASE("with contact, a scene that starts intersecting is refused", "[contact]") {
   ContactRun run(replaced(bounce, "[1.4, 0, 0]", "[0.5, 0, 0]"));
   run.options.check = CheckRun::off;
