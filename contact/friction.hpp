@@ -27,10 +27,12 @@
 #include <taut/contact/friction_kernels.hpp>
 #include <taut/core/exec/copy.hpp>
 
+#include <algorithm>
 #include <cmath>
 #include <functional>
 #include <memory>
 #include <optional>
+#include <span>
 #include <utility>
 
 namespace taut {
@@ -44,6 +46,17 @@ concept FrictionSource = requires(Source const& source,
                                   LaggedContacts<Precision, S>& to) {
   {source.lag(x, mu, to)};
 };
+
+/// 1e-3 of the diagonal of the box around `points`, per second, m/s.
+inline double default_stick_speed(std::span<Point const> points) {
+  double square = 0;
+  for (int c = 0; c < 3 && !points.empty(); ++c) {
+    double low = points[0][c], high = low;
+    for (Point const& x : points) low = std::min(low, x[c]), high = std::max(high, x[c]);
+    square += (high - low) * (high - low);
+  }
+  return 1e-3 * std::sqrt(square);
+}
 
 /// What friction amounts to in the step so far.
 struct FrictionReport {
@@ -67,9 +80,9 @@ public:
   using Contacts = LaggedContacts<Precision, Space>;
 
   struct Params {
-    /// eps_v, m/s: what is slower sticks and creeps. Else 1e-3 of the diagonal of the box around
-    /// all vertices at rest, per second. (In BDF2 the step counts as 2/3 h: what sticks is slower
-    /// by as much.)
+    /// eps_v, m/s: what is slower sticks and creeps. Else default_stick_speed of all vertices at
+    /// rest: where some are of obstacles, give that of the bodies. (In BDF2 the step counts as 2/3
+    /// h: what sticks is slower by as much.)
     std::optional<double> stick_speed = {};
   };
 
@@ -224,7 +237,7 @@ private:
 
     State(Unknowns<Precision, Space> const& unknowns, std::vector<Point> const& rest,
           Params const& params)
-        : stick_speed(params.stick_speed ? *params.stick_speed : 1e-3 * diagonal(rest)),
+        : stick_speed(params.stick_speed ? *params.stick_speed : default_stick_speed(rest)),
           from("friction_from", unknowns.size()),
           lagged(unknowns.size()) {
       if (rest.size() != std::size_t(unknowns.size())) {
@@ -237,15 +250,6 @@ private:
             "that are not all in one place",
             stick_speed);
       }
-    }
-    static double diagonal(std::vector<Point> const& rest) {
-      double square = 0;
-      for (int c = 0; c < 3 && !rest.empty(); ++c) {
-        double low = rest[0][c], high = low;
-        for (Point const& x : rest) low = std::min(low, x[c]), high = std::max(high, x[c]);
-        square += (high - low) * (high - low);
-      }
-      return std::sqrt(square);
     }
 
     void lag(Positions const& x) {

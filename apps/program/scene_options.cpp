@@ -202,7 +202,8 @@ std::span<OptionKey const> contact_keys() {
        0.0,
        {.min = 0, .max = 1e9, .unit = "m/s"},
        {},
-       "what is slower sticks, and creeps; 0: 1e-3 of the diagonal of the scene's box per second"},
+       "what is slower sticks, and creeps; 0: 1e-3 of the diagonal of the box of the bodies per "
+       "second"},
       {"friction_passes",
        1,
        {.min = 1, .max = 100},

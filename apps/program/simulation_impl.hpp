@@ -294,9 +294,10 @@ private:
     bool any = mu > 0;
     for (SceneObstacle const& obstacle : scene_.obstacles) any |= obstacle.friction.value_or(0) > 0;
     if (!any) return;
-    double const speed = scene_.contact->number("stick_speed");
-    Friction<P> friction(part.unknowns, part.rest,
-                         {speed > 0 ? std::optional<double>(speed) : std::nullopt});
+    // By default after the box of the bodies, however large the obstacles are.
+    double const given = scene_.contact->number("stick_speed");
+    double const speed = given > 0 ? given : default_stick_speed(geometry_.mesh.points);
+    Friction<P> friction(part.unknowns, part.rest, {speed});
     FrictionCoefficients of_pairs(mu);
     int const bodies = static_cast<int>(geometry_.objects.size());
     for (std::size_t k = 0; k < scene_.obstacles.size(); ++k) {
