@@ -75,7 +75,7 @@ TEST_CASE("terms adapt to what pushes against them", "[contact]") {
   Unknowns<Fp64, S> const unknowns(std::vector<double>(s.x.size(), 1), 0.5);
   SECTION("pairs") {
     Contact<PairEnergy<>, Bvh<S>, AdditiveCcd, IpcAdaptiveStiffness, Fp64> const contact(
-        unknowns, s.surface, s.rest, {.dhat = Squashed::dhat});
+        unknowns, s.surface, s.rest, {.dhat = Squashed::dhat, .start_share = 0});
     CHECK_THAT(adapted_form(contact, x, p, unknowns.fixed, 7, 1), WithinRel(7, 1e-9));
     CHECK_THAT(adapted_form(contact, x, p, unknowns.fixed, 0.5, 1), WithinRel(1, 1e-9));
     CHECK_THAT(adapted_form(contact, x, p, unknowns.fixed, 700, 1), WithinRel(100, 1e-9));
@@ -84,7 +84,7 @@ TEST_CASE("terms adapt to what pushes against them", "[contact]") {
     double low = 1e9;
     for (Point const& v : s.x) low = std::min(low, v[1]);
     Obstacle<HalfSpace, Normalised<LogBarrier>, IpcAdaptiveStiffness, Fp64> const floor(
-        unknowns, s.surface, s.rest, HalfSpace{}, {.dhat = Squashed::dhat},
+        unknowns, s.surface, s.rest, HalfSpace{}, {.dhat = Squashed::dhat, .start_share = 0},
         RigidPose{.translation = {0, low - 0.3 * Squashed::dhat, 0}});
     CHECK_THAT(adapted_form(floor, x, p, unknowns.fixed, 7, 1), WithinRel(7, 1e-9));
   }

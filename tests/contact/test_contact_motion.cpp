@@ -244,7 +244,8 @@ TEST_CASE("one contact rests where K b' balances the load, whatever the time ste
   double const h = GENERATE(0.01, 0.0025);
   CAPTURE(h);
   using Term = Contact<PairEnergy<>, Bvh<>, AdditiveCcd, GivenStiffness, Fp64>;
-  Term const contact(unknowns, surface, rest, {.dhat = dhat, .stiffness = {.pressure = pressure}});
+  Term const contact(unknowns, surface, rest,
+                     {.dhat = dhat, .start_share = 0, .stiffness = {.pressure = pressure}});
   Potential potential(unknowns, Inertia(unknowns), BodyForce(unknowns, {0, -gravity, 0}), contact);
   ImplicitEuler<Ncg<DaiKou, BlockJacobi, SufficientDecrease, DecrementWindow, Fp64>> stepper(
       {.stop = {.tolerance = 1e-9}});

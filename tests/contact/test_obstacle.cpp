@@ -44,8 +44,10 @@ struct Fixture {
 
   Fixture()
       : unknowns(std::vector<double>(scene.x.size(), 1), 0.5),
-        obstacle(unknowns, scene.surface, scene.rest, scene.shape,
-                 {.dhat = Thrown<Shape>::dhat, .stiffness = {.pressure = pressure}}, scene.pose),
+        obstacle(
+            unknowns, scene.surface, scene.rest, scene.shape,
+            {.dhat = Thrown<Shape>::dhat, .start_share = 0, .stiffness = {.pressure = pressure}},
+            scene.pose),
         x(soups::to_field<Position, S>(scene.x)),
         p(soups::to_field<Real, S>(scene.p)),
         g("g", scene.size()),
@@ -402,8 +404,8 @@ TEST_CASE("a vertex shows what faces one way of the area around it", "[obstacle]
 TEST_CASE("the stiffness of an obstacle may follow what the vertices resist with", "[obstacle]") {
   Fixture<InsideBall, Fp64> f;
   using Term = Obstacle<InsideBall, Default, ElasticInclusiveStiffness, Fp64>;
-  Term const obstacle(f.unknowns, f.scene.surface, f.scene.rest, f.scene.shape, {.dhat = 0.3},
-                      f.scene.pose);
+  Term const obstacle(f.unknowns, f.scene.surface, f.scene.rest, f.scene.shape,
+                      {.dhat = 0.3, .start_share = 0}, f.scene.pose);
   CHECK_THROWS_WITH(obstacle.value(f.x, 1), ContainsSubstring("begin_step"));
   Array<double, DefaultSpace> const stiffness("stiffness", f.scene.size());
   assign(stiffness, 100);

@@ -303,7 +303,7 @@ TEST_CASE("a weight on a plane rests where P g' balances it, whatever the time s
   CAPTURE(h);
   using Term = Obstacle<HalfSpace, Default, GivenStiffness, Fp64>;
   Term const obstacle(unknowns, surface, rest, {},
-                      {.dhat = dhat, .stiffness = {.pressure = pressure}});
+                      {.dhat = dhat, .start_share = 0, .stiffness = {.pressure = pressure}});
   Potential potential(unknowns, Inertia(unknowns), BodyForce(unknowns, {0, -gravity, 0}), obstacle);
   ImplicitEuler<Ncg<DaiKou, BlockJacobi, SufficientDecrease, DecrementWindow, Fp64>> stepper(
       {.stop = {.tolerance = 1e-9}});
@@ -320,8 +320,9 @@ TEST_CASE("a block on a plane rests at one gap, whatever the time step and the m
   double const dhat = 0.03, pressure = 2e4, height = 0.4;
   auto const resting_gap = [&](int resolution, double h) {
     Block const block = block_above(resolution, 0.7 * dhat, 0, {0.4, height, 0.4});
-    ObstacleOf<HalfSpace> const obstacle(block.body.unknowns, block.surface, block.body.rest.points,
-                                         {}, {.dhat = dhat, .stiffness = {.pressure = pressure}});
+    ObstacleOf<HalfSpace> const obstacle(
+        block.body.unknowns, block.surface, block.body.rest.points, {},
+        {.dhat = dhat, .start_share = 0, .stiffness = {.pressure = pressure}});
     // Stiff, so that it stands as a whole.
     auto potential = potential_of(block, 1e7, 0.3, obstacle);
     Stepper stepper({.stop = {.tolerance = 1e-5}});
