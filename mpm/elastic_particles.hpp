@@ -40,8 +40,7 @@ struct PreparePoints {
       data(SlotLayout<S, Real, point_numbers>::place(slot, k)) = static_cast<Real>(value);
     };
     for (int c = 0; c < 3; ++c) {
-      double const x = double(particles.x(like, c)) * per_dx;
-      set(c, (x - base_node<K>(x)) - K::start);
+      set(c, place_in_cell<K>(double(particles.x(like, c)) * per_dx, blocks.cell(like, c)));
     }
     for (int k = 0; k < 9; ++k) set(3 + k, double(particles.F(like, k)));
     set(12, p >= 0 ? double(particles.volume(p)) * double(particles.stiffness(p)) : 0);

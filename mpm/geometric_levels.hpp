@@ -56,7 +56,7 @@ struct NumbersOfLevel {
     int const p = blocks.particle(slot), like = blocks.like(slot);
     for (int c = 0; c < 3; ++c) {
       double const at = double(x(like, c)) * per_dx;
-      to(Layout::place(slot, c)) = Real((at - base_node<K>(at)) - K::start);
+      to(Layout::place(slot, c)) = Real(place_in_cell<K>(at, blocks.cell(like, c)));
     }
     for (int k = 3; k < operator_numbers; ++k) {
       to(Layout::place(slot, k)) = p >= 0 ? factor * fine(Layout::place(fine_slot(p), k)) : Real(0);

@@ -195,7 +195,7 @@ private:
     grow(volume_, "ghost_volume", std::size_t(n));
     for_each<Space>("ghost_volumes", blocks_.patches,
                     kernels::VolumeOfPatch<Space, Precision, K>{
-                        blocks_, {particles_, rows_.nodes.dx}, partial_});
+                        blocks_, {particles_, rows_.nodes.dx, blocks_.cell}, partial_});
     using Write = kernels::WriteVolume<Space>;
     for_each<Space>("ghost_volumes", n,
                     kernels::GatherRows<Space, double, K, 1, Write>{blocks_, partial_, {volume_}});

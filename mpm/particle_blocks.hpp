@@ -58,7 +58,9 @@ struct BlockViews {
   List<int> heart;
   List<int> patch_begin;  ///< per block, +1
   Kokkos::View<int* [3], typename S::layout, typename S::memory>
-      origin;                ///< per block: its lowest node
+      origin;  ///< per block: its lowest node
+  Kokkos::View<int* [3], typename S::layout, typename S::memory>
+      cell;                  ///< per particle: the lowest node that it sees
   List<int> node;            ///< per block and local node: number in the grid, or -1
   List<int> row_begin, row;  ///< per node of the grid: its rows, patch * nodes + local
 
@@ -396,6 +398,7 @@ void ParticleBlocks<K, S>::sort(Positions const& x, List<int const> const& mater
       exclusive_scan<S, int>("patches_before", count, patch_changes, patches_before_);
   int const blocks = exclusive_scan<S, int>("blocks_before", count, block_changes, blocks_before_);
   cell_count_ = exclusive_scan<S, int>("cells_before", count, cell_changes, cells_before_);
+  views_.cell = cell_;
   views_.patches = patches;
   views_.blocks = blocks;
   views_.materials = materials;

@@ -85,6 +85,15 @@ KOKKOS_FORCEINLINE_FUNCTION double base_node(double x) {
   return Kokkos::floor(x - K::start);
 }
 
+/// t of a particle at x (in cells) that was sorted into the cell of `base`. Kernels take it from
+/// that cell instead of finding theirs: a device may round x otherwise in each of them, and where x
+/// is on the border of two cells the weights of one would fall on the nodes of the other. So t may
+/// be a round-off outside of [0, 1), which the weights do not mind.
+template <Spline K>
+KOKKOS_FORCEINLINE_FUNCTION double place_in_cell(double x, int base) {
+  return (x - base) - K::start;
+}
+
 /// Weights and slopes (per cell) along the three axes.
 template <Spline K, class T>
 struct Weights {

@@ -70,14 +70,14 @@ struct PlaceInCell {
   using Scalar = typename Precision::position;
   Particles<Precision, S> particles;
   double dx;
+  Kokkos::View<int* [3], typename S::layout, typename S::memory> cell;  ///< BlockViews
 
   /// t along each axis (spline.hpp).
   KOKKOS_FORCEINLINE_FUNCTION Vec3<double> operator()(int p) const {
     Vec3<double> t;
     double const per_dx = 1 / dx;
     for (int c = 0; c < 3; ++c) {
-      double const x = double(particles.x(p, c)) * per_dx;
-      t[c] = (x - base_node<K>(x)) - K::start;
+      t[c] = place_in_cell<K>(double(particles.x(p, c)) * per_dx, cell(p, c));
     }
     return t;
   }
@@ -385,7 +385,8 @@ public:
     velocity_ = velocity_memory_.resize("node_velocity", nodes);
     grow(partial_, "transfer_partial",
          std::size_t(4) * BlockViews<K, Space>::nodes * views.patches);
-    kernels::ToGrid<Space, Precision, K, packed> const kernel{{views}, {particles, dx}, partial_};
+    kernels::ToGrid<Space, Precision, K, packed> const kernel{
+        {views}, {particles, dx, views.cell}, partial_};
     for_each_team<Space>("particles_to_grid", views.patches, team_size_, kernel.scratch_bytes(),
                          kernel);
     using Write = kernels::WriteNodes<Space, Scalar>;
@@ -406,10 +407,10 @@ public:
   void to_particles(Particles<Precision, Space> const& particles, Blocks const& blocks,
                     Positions const& x, Positions const& rest, Positions const& v, double h,
                     double dx, T const& transfer, F const& flow) const {
+    auto const& views = blocks.views();
     kernels::ToParticles<Space, Precision, K, T, F, packed> const kernel{
-        {blocks.views()}, {particles, dx}, {x, rest}, {v}, {velocity_}, h, transfer, flow};
-    for_each_team<Space>("to_particles", blocks.views().patches, team_size_, kernel.scratch_bytes(),
-                         kernel);
+        {views}, {particles, dx, views.cell}, {x, rest}, {v}, {velocity_}, h, transfer, flow};
+    for_each_team<Space>("to_particles", views.patches, team_size_, kernel.scratch_bytes(), kernel);
   }
 
 private:
@@ -426,9 +427,10 @@ template <Spline K, class Precision, class Space, class Positions>
 double farthest_travel(Particles<Precision, Space> const& particles,
                        ParticleBlocks<K, Space> const& blocks, Positions const& x,
                        Positions const& rest, double dx) {
+  auto const& views = blocks.views();
   return maximum<Space>(
-      "particle_travel", blocks.views().patches, 0.0,
-      kernels::ParticleTravel<Space, Precision, K>{blocks.views(), {particles, dx}, x, rest});
+      "particle_travel", views.patches, 0.0,
+      kernels::ParticleTravel<Space, Precision, K>{views, {particles, dx, views.cell}, x, rest});
 }
 
 }  // namespace taut
