@@ -12,6 +12,7 @@
 #include <taut/core/report/error.hpp>
 #include <taut/mpm/distance_field.hpp>
 
+#include <algorithm>
 #include <cstdint>
 #include <functional>
 #include <memory>
@@ -151,6 +152,12 @@ struct BoundaryMotion {
   Vec3<double> spin{};      ///< rad/s
 };
 
+/// The most that a boundary moves at.
+struct BoundarySpeed {
+  double linear = 0;   ///< of the pose's origin, m/s
+  double angular = 0;  ///< rad/s
+};
+
 /// A boundary as a scene has it. Sizes, in the shape's own frame:
 ///
 ///   half_space   solid below y = 0                    box        lengths along x, y, z
@@ -221,12 +228,18 @@ public:
   int count() const { return static_cast<int>(specs_.size()); }
   Kokkos::View<Boundary const*, typename S::memory> list() const { return list_; }
   std::vector<BoundarySpec> const& specs() const { return specs_; }
-  /// Whether any is not sticky: those are a term (slip.hpp).
-  bool any_slip() const {
-    for (BoundarySpec const& spec : specs_) {
-      if (spec.contact != BoundaryContact::sticky) return true;
+  /// Of boundary k in the h seconds after `time`, of eight moments: what moves for less than an
+  /// eighth of them may be missed.
+  BoundarySpeed fastest(int k, double time, double h) const {
+    constexpr int moments = 8;
+    BoundarySpeed most;
+    auto const& motion = specs_[static_cast<std::size_t>(k)].motion;
+    for (int m = 1; motion && m <= moments; ++m) {
+      BoundaryMotion const at = motion(time + h * m / moments);
+      most.linear = std::max(most.linear, norm(at.velocity));
+      most.angular = std::max(most.angular, norm(at.spin));
     }
-    return false;
+    return most;
   }
 
 private:

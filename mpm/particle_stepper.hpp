@@ -6,11 +6,12 @@
 //   bring velocities back, F <- (I + grad (x - X)) F, return map, move the particles.
 //
 // (Jiang et al. 2016; Wang et al. 2020.) The grid is forgotten after the step. A step in which a
-// particle would go farther than its bound, or that does not end in numbers, is taken back and
-// tried with half the time.
+// particle would go farther than its bound, in which boundaries would fold what they hold, or that
+// does not end in numbers, is taken back and tried with half the time.
 #pragma once
 
 #include <taut/core/exec/copy.hpp>
+#include <taut/core/potential/obstruction.hpp>
 #include <taut/mpm/material_range.hpp>
 #include <taut/mpm/particle_grid.hpp>
 
@@ -26,6 +27,29 @@ struct ParticleStepParams {
   double crossing = 1;    ///< cells that a particle may go at most
   int max_halvings = 10;  ///< of a step, before it is given up
 };
+
+namespace kernels {
+
+/// Seconds in which a boundary, by its largest speeds, goes at most `stride` metres through where
+/// particles see it.
+template <class S, class Scalar>
+struct TimeToMeet {
+  VectorField<Scalar, S> x;
+  Kokkos::View<Boundary const*, typename S::memory> boundaries;
+  int boundary;
+  BoundarySpeed speed;
+  double sight, stride;
+  KOKKOS_FUNCTION void operator()(int p, double& least) const {
+    Boundary const& b = boundaries(boundary);
+    Vec3<double> const at{double(x(p, 0)), double(x(p, 1)), double(x(p, 2))};
+    Vec3<double> normal;
+    double const room = b.distance(at, normal) - sight;
+    double const fast = speed.linear + speed.angular * norm(at - b.pose.translation);
+    if (fast > 0) least = Kokkos::min(least, Kokkos::max(stride, room) / fast);
+  }
+};
+
+}  // namespace kernels
 
 /// What a step did: the minimiser's report, and the rest.
 template <class Report>
@@ -61,10 +85,33 @@ public:
     }
   }
 
-  /// Seconds in which the fastest particle goes `cfl` cells, at most `longest`.
+  /// Seconds in which the fastest particle goes `cfl` cells, at most `longest`. Where a particle is
+  /// of no speed that is `longest`: the step says which it is.
   double cfl_step(Particles<Precision, Space> const& particles, double dx, double longest) const {
     double const speed = fastest(particles);
+    if (!std::isfinite(speed)) return longest;
     return speed * longest > params_.cfl * dx ? params_.cfl * dx / speed : longest;
+  }
+  /// The same, in which no boundary that is near goes farther through what particles see, either:
+  /// it would be past them before a node has felt it. A boundary that is far may come near. `time`:
+  /// now, which becomes that of the boundaries if any moves.
+  double cfl_step(Particles<Precision, Space> const& particles, double dx, double longest,
+                  BoundaryList<Space>& boundaries, double time) const {
+    double h = cfl_step(particles, dx, longest);
+    double const stride = params_.cfl * dx;
+    // Nodes that particles see along a diagonal, and where particles may go.
+    double const sight = (0.5 * K::width * std::sqrt(3.0) + params_.crossing) * dx;
+    bool placed = false;
+    for (int k = 0; k < boundaries.count(); ++k) {
+      BoundarySpeed const speed = boundaries.fastest(k, time, h);
+      if (speed.linear == 0 && speed.angular == 0) continue;
+      if (!placed) boundaries.set_time(time);
+      placed = true;
+      h = minimum<Space>("time_to_meet", particles.count, h,
+                         kernels::TimeToMeet<Space, typename Precision::position>{
+                             particles.x, boundaries.list(), k, speed, sight, stride});
+    }
+    return h;
   }
 
   /// Advances particles by h seconds, or by the part of it that the report says. `scene` is a
@@ -95,6 +142,13 @@ public:
       return report;
     }
     for (;; h /= 2, ++report.halvings) {
+      // What lags is where the step begins again, not where the refused one ended.
+      if (report.halvings > 0) {
+        scene.for_each_term([&](auto& term) {
+          using Term = std::decay_t<decltype(term)>;
+          if constexpr (requires { term.particles(); } && LaggedTerm<Term>) term.relag(grid.rest());
+        });
+      }
       boundaries.set_time(time + h);
       grid.fix(boundaries, h);
       scene.for_each_term([&](auto& term) {
@@ -103,7 +157,12 @@ public:
         }
       });
       start(grid);
-      report.minimiser = stepper_.step(scene, state_, h, observer...);
+      try {
+        report.minimiser = stepper_.step(scene, state_, h, observer...);
+      } catch (HeldUp const&) {  // boundaries go less far in half the time
+        if (report.halvings >= params_.max_halvings) throw;
+        continue;
+      }
       bool const finite = report.minimiser.stop != decltype(report.minimiser.stop)::non_finite;
       double const allowed = params_.crossing * grid.dx();
       double travel = std::numeric_limits<double>::infinity();

@@ -328,7 +328,7 @@ private:
     }
     // What round-off has added to the frame is no step of its own.
     double h = stepper_.cfl_step(particles_, points_.spacing,
-                                 left <= longest * (1 + 1e-9) ? left : longest);
+                                 left <= longest * (1 + 1e-9) ? left : longest, boundaries_, time_);
     if (points_.time_error && next_ > 0) h = std::min(h, next_);
     if (h < left && 2 * h > left) h = left / 2;
     if (!points_.time_error) return try_step(h, observer);

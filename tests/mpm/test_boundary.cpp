@@ -106,9 +106,9 @@ struct Run {
     return std::sqrt(sum / mass);
   }
 };
-/// A cube of 0.3 m on the plane y = 0, moving.
-std::vector<Particle> cube(Vec3<double> const& v) {
-  auto list = test::jittered_block(3, 2, 0.1, {0.2, 0, 0.2});
+/// A cube of 0.3 m, or so many cells, on the plane y = 0, moving.
+std::vector<Particle> cube(Vec3<double> const& v, int cells = 3) {
+  auto list = test::jittered_block(cells, 2, 0.1, {0.2, 0, 0.2});
   for (Particle& p : list) {
     p.F = identity3<double>();
     p.C = 0.0 * identity3<double>();
@@ -268,6 +268,84 @@ TEST_CASE("a corner of three planes holds a body in all of them", "[mpm][boundar
     triple += held == 3;
   }
   CHECK(triple > 0);
+}
+
+/// What moves at a constant velocity.
+BoundarySpec moving_ball(Vec3<double> const& centre, Vec3<double> const& velocity) {
+  return {
+      .name = "ball", .shape = BoundaryShape::ball, .size = {0.15, 0, 0}, .motion = [=](double t) {
+        return BoundaryMotion{{identity3<double>(), centre + t * velocity}, velocity, {}};
+      }};
+}
+
+TEST_CASE("a fast boundary pushes particles that rest instead of passing them", "[mpm][boundary]") {
+  double const frame = 0.3;
+  Run run(cube({0, 0, 0}, 1), {moving_ball({-0.2, 0.05, 0.07}, {3, 0, 0})}, {0, 0, 0});
+  int steps = 0;
+  while (run.time < frame) {
+    double const left = frame - run.time;
+    double const h = run.stepper.cfl_step(run.particles, run.dx, left, run.boundaries, run.time);
+    auto const report =
+        run.stepper.step(run.scene, run.grid, run.particles, h, run.boundaries, run.time);
+    run.time = report.time_step < left ? run.time + report.time_step : frame;
+    ++steps;
+  }
+  CHECK(mean_velocity(run.particles.read())[0] > 1.5);
+  CHECK(steps < 40);
+}
+
+TEST_CASE("steps are shortened by boundaries that are near and move", "[mpm][boundary]") {
+  // Particles see 2.6 cells far, and may go one: what is 5 m away has room for most of that.
+  auto const step_with = [](BoundarySpec const& spec, double longest) {
+    Run run(cube({0, 0, 0}), {spec}, {0, 0, 0});
+    return run.stepper.cfl_step(run.particles, run.dx, longest, run.boundaries, 0);
+  };
+  Vec3<double> const near{0.17, 0.15, 0.17}, far{-5, 0.15, 0.17};
+  CHECK_THAT(step_with(moving_ball(near, {10, 0, 0}), 1), WithinRel(0.006, 1e-12));
+  CHECK(step_with(moving_ball(near, {0, 0, 0}), 1) == 1);
+  CHECK(step_with(moving_ball(far, {10, 0, 0}), 0.2) == 0.2);
+  double const met = step_with(moving_ball(far, {10, 0, 0}), 10);
+  CHECK(met > 0.4);
+  CHECK(met < 0.5);
+  // Turning about its middle, 0.26 m from the farthest particle at most.
+  BoundarySpec turning = moving_ball(near, {0, 0, 0});
+  turning.motion = [=](double) {
+    return BoundaryMotion{{identity3<double>(), near}, {0, 0, 0}, {0, 10, 0}};
+  };
+  double const turned = step_with(turning, 1);
+  CHECK(turned > 0.06 / (10 * 0.3));
+  CHECK(turned < 0.06 / (10 * 0.15));
+  // One that begins to move late in the step.
+  BoundarySpec late = moving_ball(near, {0, 0, 0});
+  late.motion = [=](double t) {
+    return BoundaryMotion{{identity3<double>(), near}, {t > 0.8 ? 10.0 : 0.0, 0, 0}, {}};
+  };
+  CHECK_THAT(step_with(late, 1), WithinRel(0.006, 1e-12));
+}
+
+TEST_CASE("a step in which boundaries would fold what they hold is halved", "[mpm][boundary]") {
+  using Firm = ElasticParticles<Elastic<NeoHookean, FullProjection>, QuadraticSpline, P>;
+  // Two jaws that hold all nodes between them, and close by two cells in the step.
+  std::vector<BoundarySpec> jaws;
+  for (double const side : {-1.0, 1.0}) {
+    Vec3<double> const velocity{-5 * side, 0, 0};
+    jaws.push_back(
+        {.name = "jaw", .shape = BoundaryShape::box, .size = {1, 4, 4}, .motion = [=](double t) {
+           return BoundaryMotion{
+               {identity3<double>(), Vec3<double>{0.17 + 0.52 * side, 0, 0} + t * velocity},
+               velocity,
+               {}};
+         }});
+  }
+  ParticleGrid<QuadraticSpline, P> grid(0.1);
+  Potential<Inertia<P>, Firm> scene(grid.unknowns(), Inertia<P>(grid.unknowns()),
+                                    Firm({lame_parameters(1e5, 0.3)}));
+  ParticleStepper<ImplicitEuler<Minimiser>> stepper;
+  Particles<P, S> const particles(cube({0, 0, 0}));
+  BoundaryList<S> boundaries(jaws);
+  auto const report = stepper.step(scene, grid, particles, 0.02, boundaries);
+  CHECK(report.halvings > 0);
+  for (Particle const& p : particles.read()) CHECK(determinant(p.F) > 0);
 }
 
 TEST_CASE("what sticks goes where the boundary goes, turning too", "[mpm][boundary]") {

@@ -221,6 +221,7 @@ TEST_CASE("a step in which a particle goes too far is halved", "[mpm][stepper]")
   CHECK_THROWS_WITH(run.step(0), ContainsSubstring("a step of 0 s"));
   run.particles.v(7, 1) = std::numeric_limits<double>::quiet_NaN();
   CHECK_THROWS_WITH(run.step(0.01), ContainsSubstring("particle 7: its velocity"));
+  CHECK(run.stepper.cfl_step(run.particles, 0.1, 0.01) == 0.01);
 }
 
 int allocations = 0;

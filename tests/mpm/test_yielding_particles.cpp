@@ -178,6 +178,32 @@ Wrung wring(bool in_step, double h, double time, Visit const& visit) {
   return measure(particles.read(), lame, dx);
 }
 
+TEST_CASE("a step of sand that was halved is that of half the time", "[mpm][yielding]") {
+  double const dx = 0.1, h = 0.04;
+  Lame<double> const lame = lame_parameters(1e5, 0.3);
+  DruckerPrager const sand{lame.mu, lame.lambda, 30};
+  auto list = jittered_block(2, 2, dx, {0.3, 0.2, -0.6});
+  for (Particle& p : list) {
+    p.F = 0.99 * identity3<double>();
+    p.C = 0.0 * identity3<double>();
+    p.v = {3, -2 * (p.x[1] - 0.12), 0};  // squeezed, and 1.2 cells of travel
+    p.stiffness = 1;
+    p.plastic = 0;
+  }
+  auto const after = [&](double asked, int halvings) {
+    Particles<Fp64, S> const particles(list);
+    ParticleGrid<QuadraticSpline, Fp64, S> grid(dx);
+    Potential scene(grid.unknowns(), Inertia<Fp64>(grid.unknowns()), Solid({hencky(lame, sand)}));
+    ParticleStepper<ImplicitEuler<Minimiser>> stepper(
+        ImplicitEuler<Minimiser>({.stop = {.tolerance = 1e-4}}, {.passes = 2}));
+    CHECK(stepper.step(scene, grid, particles, asked).halvings == halvings);
+    return particles.read();
+  };
+  auto const halved = after(h, 1), direct = after(h / 2, 0);
+  for (std::size_t p = 0; p < list.size(); ++p)
+    CHECK_THAT(norm(halved[p].x - direct[p].x), WithinAbs(0, 1e-12 * dx));
+}
+
 TEST_CASE("a cube that is wrung flows, and no step makes energy", "[mpm][yielding]") {
   double last = std::numeric_limits<double>::infinity(), first = 0;
   Vec3<double> momentum{};
