@@ -136,12 +136,12 @@ public:
     if (nodes == 0) return false;
     BlockCsr<S, double> a = matrix(rows, by_part);
     grow(unknowns_, host_, "exact_unknowns", std::size_t(3) * nodes);
-    for (double next = round_off; next < 1e-3; next *= 16) {
+    for (double next = round_off;; next *= 16) {
       if (solver_.factorize(a) == Definiteness::positive) return true;
+      if (!(next < 1e-3)) return false;
       for_each<S>("exact_shift", nodes, kernels::ShiftDiagonal<S>{a, next});
       shift_ += next;
     }
-    return false;
   }
   /// Over all nodes that there are, x = .., or x += .. if `add`.
   template <class B, class X>

@@ -23,10 +23,10 @@ struct LeafTable {
   unsigned wrap = 0;  ///< buckets in use - 1: a power of two less one
   int count = 0;
 
-  KOKKOS_FUNCTION static unsigned hash(int i, int j, int k) {
-    unsigned h = static_cast<unsigned>(i >> 3) * 0x9e3779b1u ^
-                 static_cast<unsigned>(j >> 3) * 0x85ebca77u ^
-                 static_cast<unsigned>(k >> 3) * 0xc2b2ae3du;
+  KOKKOS_FUNCTION static unsigned hash(int i, int j, int k) { return mix(i >> 3, j >> 3, k >> 3); }
+  KOKKOS_FUNCTION static unsigned mix(int i, int j, int k) {
+    unsigned h = static_cast<unsigned>(i) * 0x9e3779b1u ^ static_cast<unsigned>(j) * 0x85ebca77u ^
+                 static_cast<unsigned>(k) * 0xc2b2ae3du;
     h ^= h >> 15;
     h *= 0x27d4eb2fu;
     return h ^ h >> 13;

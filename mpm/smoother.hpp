@@ -131,6 +131,23 @@ struct RecursionUpdate {
   }
 };
 
+/// Takes a step of a recursion, around M where the level has a preconditioner of its own that is
+/// not D^-1 alone.
+template <class A, class T, class S>
+void take_step(A const& a, RecursionStep<S, T> const& step) {
+  if constexpr (PreconditionedLevel<A>) {
+    if (a.patches() > 0) {
+      for_each<S>("smoother_residual", a.size(),
+                  RecursionResidual<S, T>{step.b, step.r, step.y, step.first});
+      auto const z = a.preconditioned(step.r);
+      for_each<S>("smoother_step", a.size(),
+                  RecursionUpdate<S, T>{z, step.d, step.x, step.keep, step.take, step.first});
+      return;
+    }
+  }
+  for_each<S>("smoother_step", a.size(), step);
+}
+
 /// r -= y
 template <class S, class T>
 struct SubtractProduct {
@@ -268,10 +285,10 @@ private:
       kernels::RecursionStep<S, T> step{a.inverse(), first ? v.b : v.y, v.r, v.y, v.d, v.x,
                                         T(0),        T(damping_),       true};
       if (first) {
-        for_each<S>("jacobi_step", a.size(), step);
+        kernels::take_step(a, step);
       } else {
         step.x = v.d;
-        for_each<S>("jacobi_step", a.size(), step);
+        kernels::take_step(a, step);
         for_each<S>("jacobi_add", a.size(), kernels::AddVectors<S, T>{v.d, v.x});
       }
     }
@@ -331,7 +348,7 @@ private:
       a.product(v.x, v.y);
       for_each<S>("chebyshev_start", a.size(), kernels::ConvertVectors<S, T, T>{v.b, v.r});
     }
-    take(a, step);
+    kernels::take_step(a, step);
     step.first = false;
     for (int k = 1; k < params_.degree; ++k) {
       double const next = 1 / (2 * middle / half - rho);
@@ -339,23 +356,9 @@ private:
       step.take = T(2 * next / half);
       rho = next;
       a.product(v.d, v.y);
-      take(a, step);
+      kernels::take_step(a, step);
     }
   }
-  template <class A, class T, class S>
-  static void take(A const& a, kernels::RecursionStep<S, T> const& step) {
-    if constexpr (PreconditionedLevel<A>) {
-      for_each<S>("chebyshev_residual", a.size(),
-                  kernels::RecursionResidual<S, T>{step.b, step.r, step.y, step.first});
-      auto const z = a.preconditioned(step.r);
-      for_each<S>(
-          "chebyshev_step", a.size(),
-          kernels::RecursionUpdate<S, T>{z, step.d, step.x, step.keep, step.take, step.first});
-    } else {
-      for_each<S>("chebyshev_step", a.size(), step);
-    }
-  }
-
   Params params_;
   double largest_ = 1;
 };

@@ -32,7 +32,8 @@ template <class S>
 KOKKOS_FUNCTION Vec3<double> scattered_numbers(GridNodes<S> const& nodes, int i) {
   Vec3<double> numbers;
   for (int c = 0; c < 3; ++c) {
-    unsigned h = LeafTable<S>::hash(8 * nodes.ijk(i, 0), 8 * nodes.ijk(i, 1), 8 * nodes.ijk(i, 2)) +
+    // From its numbers themselves: eight times a node far away would be too large for an int.
+    unsigned h = LeafTable<S>::mix(nodes.ijk(i, 0), nodes.ijk(i, 1), nodes.ijk(i, 2)) +
                  0x9e3779b9u * static_cast<unsigned>(c + 1);
     h ^= h >> 16;
     h *= 0x7feb352du;
@@ -140,13 +141,15 @@ struct PowerNext {
 
 }  // namespace kernels
 
-/// `A` has a preconditioner of its own in the place of D^-1: z = M r, kept until the next call.
+/// `A` has a preconditioner of its own in the place of D^-1: z = M r, kept until the next call. It
+/// is D^-1 where there are no patches.
 template <class A>
 concept PreconditionedLevel = LevelOperator<A> &&
     requires(A const& a, VectorField<typename A::Scalar, typename A::Space> const& r) {
   {
     a.preconditioned(r)
     } -> std::convertible_to<VectorField<typename A::Scalar, typename A::Space>>;
+  { a.patches() } -> std::convertible_to<int>;
 };
 
 /// The largest eigenvalue of D^-1 A: a Ritz value and its residual, which is hardly ever below it,

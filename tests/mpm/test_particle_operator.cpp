@@ -300,6 +300,77 @@ TEST_CASE("cut cells are solved with by patches", "[mpm][operator]") {
     }
   }
   CHECK(apart(level.preconditioned(r), expected, l.n) < 1e-9);
+
+  // Jacobi's step is along M r as well.
+  LevelVectors<double, S> v;
+  v.resize(l.n);
+  for (int i = 0; i < l.n; ++i)
+    for (int c = 0; c < 3; ++c) {
+      v.b(i, c) = r(i, c);
+      expected(i, c) *= 0.25;
+    }
+  DampedJacobi const jacobi({.damping = 0.25});
+  jacobi.first(level, v);
+  CHECK(apart(v.x, expected, l.n) < 1e-9);
+  // And the second adds the same of what is left.
+  VectorField<double, S> const left = l.vectors();
+  level.residual(v.b, v.x, left);
+  auto const& z = level.preconditioned(left);
+  for (int i = 0; i < l.n; ++i)
+    for (int c = 0; c < 3; ++c) expected(i, c) += 0.25 * z(i, c);
+  jacobi.second(level, v);
+  CHECK(apart(v.x, expected, l.n) < 1e-9);
+
+  // Without patches it is a level like others.
+  level.set({.ratio = 0});
+  level.finish();
+  REQUIRE(level.patches() == 0);
+  ActionLevel<Linearised<C>::Operator, S, double> plain;
+  plain.resize(nodes, l.to.fixed(), l.to);
+  plain.finish();
+  auto const smoothed = [&](auto const& by) {
+    Chebyshev chebyshev;
+    chebyshev.setup(by, v);
+    for (int i = 0; i < l.n; ++i)
+      for (int c = 0; c < 3; ++c) v.b(i, c) = r(i, c);
+    chebyshev.first(by, v);
+    return std::vector<double>(v.x.data(), v.x.data() + 3 * l.n);
+  };
+  std::vector<double> const with = smoothed(level), without = smoothed(plain);
+  for (std::size_t k = 0; k < with.size(); ++k)
+    CHECK_THAT(with[k], Catch::Matchers::WithinRel(without[k], 1e-9));
+}
+
+TEST_CASE("the diagonal of an exact block is raised up to the last shift", "[mpm][operator]") {
+  using C = Of<Fp64, test::RightOf<DefaultSpace>, true>;
+  Linearised<C> const l;
+  auto level = l.matrix();
+  kernels::NodeIndices<C::Space> const part("part", l.n);
+  for (int i = 0; i < l.n; ++i) part(i) = i == 5 ? 0 : -1;
+  auto const factorizes = [&](double beside) {
+    level.matrix().set(5, 0, 0, 0, Mat3<double>{{1, beside, 0, beside, 1, 0, 0, 0, 1}});
+    ExactBlock<C::Space> block;
+    bool const done = block.factorize(level.matrix(), part, 1, false, 1e-4);
+    return std::pair(done, block.shift());
+  };
+  CHECK(factorizes(0.5) == std::pair(true, 0.0));
+  // One shift of 1e-4 does, and the next would be above 1e-3.
+  auto const [done, shift] = factorizes(1 + 5e-5);
+  CHECK(done);
+  CHECK(shift == 1e-4);
+  CHECK_FALSE(factorizes(1.01).first);
+}
+
+TEST_CASE("nodes far away have numbers of their own to start from", "[mpm][operator]") {
+  using S = test::RightOf<DefaultSpace>;
+  GridNodes<S> nodes;
+  nodes.ijk = decltype(nodes.ijk)("ijk", 2);
+  // Eight times these is the same number of 32 bits.
+  nodes.ijk(0, 0) = (1 << 29) - 64;
+  nodes.ijk(1, 0) = -64;
+  Vec3<double> const far = kernels::scattered_numbers(nodes, 0),
+                     near = kernels::scattered_numbers(nodes, 1);
+  CHECK(norm(far - near) > 0);
 }
 
 TEST_CASE("light nodes are solved with exactly, around a cycle", "[mpm][operator]") {
