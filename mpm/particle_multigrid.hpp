@@ -43,7 +43,7 @@ struct Strengthening {
   /// it always is, 0: it never is.
   int from = 0;
   double light = 0.1;       ///< what LightNodes takes
-  int most_light = 3000;    ///< nodes; the cycle stays plain where there are more
+  int most_light = 3000;    ///< nodes; where there are more they stay as they are
   int sparse_nodes = 2000;  ///< of the coarsest level
 };
 
@@ -92,7 +92,7 @@ public:
   /// A minimisation begins.
   void start() {
     applied_ = 0;
-    strong_ = false;
+    strong_ = has_light_ = false;
   }
   /// Takes the Hessian at x, and builds the hierarchy.
   template <class E>
@@ -100,9 +100,9 @@ public:
     Strengthening const& strong = params_.strengthening;
     operator_.linearise(e, x, local_);
     if constexpr (!assembled) {
-      strong_ = strong.from > 0 && applied_ + 1 >= strong.from &&
-                light_.build(operator_, strong.light, strong.most_light);
-      if (rounded && strong_) {
+      strong_ = strong.from > 0 && applied_ + 1 >= strong.from;
+      has_light_ = strong_ && light_.build(operator_, strong.light, strong.most_light);
+      if (rounded && has_light_) {
         for (auto& v : rounded_) grow(v, "rounded_vector", operator_.nodes().count);
       }
       cycle_.set_sparse_nodes(strong_ ? strong.sparse_nodes : params_.cycle.sparse_nodes);
@@ -129,7 +129,7 @@ public:
   /// z = P g. Allocates nothing.
   void apply(Vectors const& g, Vectors const& z) const {
     ++applied_;
-    if (!strong_) return cycle_.apply(g, z);
+    if (!has_light_) return cycle_.apply(g, z);
     if constexpr (rounded) {
       int const n = fine_.size();
       for_each<S>("round_gradient", n, kernels::ConvertVectors<S, Real, FineReal>{g, rounded_[0]});
@@ -153,7 +153,7 @@ public:
   /// Whether the last update has strengthened the cycle.
   bool strong() const { return strong_; }
   /// Nodes that the last cycle solves with exactly.
-  int light_nodes() const { return strong_ ? light_.nodes() : 0; }
+  int light_nodes() const { return has_light_ ? light_.nodes() : 0; }
   Cycle const& cycle() const { return cycle_; }
   Fine const& fine() const { return fine_; }
   Operator const& hessian() const { return operator_; }
@@ -185,6 +185,7 @@ private:
   FineVectors rounded_[2];   ///< what a strong cycle starts from, and what it makes of it
   mutable int applied_ = 0;  ///< times in this minimisation
   bool strong_ = false;
+  bool has_light_ = false;  ///< and light nodes are solved with exactly
 };
 
 }  // namespace taut

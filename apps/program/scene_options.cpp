@@ -91,8 +91,8 @@ std::span<OptionKey const> solver_keys() {
        {},
        {"auto", "always", "never"},
        "of multigrid of material points, which then also solves exactly with nodes that hardly any "
-       "particle sees, and with the first coarser level of at most 2000 nodes, where no more than "
-       "3000 of the former are; auto: once it has been applied 400 times in a step"},
+       "particle sees, where they are no more than 3000, and with the first coarser level of at "
+       "most 2000 nodes; auto: once it has been applied 400 times in a step"},
       {"forget",
        false,
        {},
