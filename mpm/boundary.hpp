@@ -32,11 +32,12 @@ struct FieldView {
   double spacing = 1, band = 0;
   Vec3<double> lowest{};
 
-  /// The trilinear interpolant, and its direction of ascent; the band's width around the lattice.
+  /// The trilinear interpolant, and its direction of ascent, which is 0 where all is as far as the
+  /// band; the band's width around the lattice.
   KOKKOS_FUNCTION double distance(Vec3<double> const& y, Vec3<double>& normal) const {
     int at[3];
     double t[3];
-    normal = {0, 1, 0};
+    normal = {};
     for (int c = 0; c < 3; ++c) {
       double const u = (y[c] - lowest[c]) / spacing;
       if (!(u >= 0 && u < n[c] - 1)) return band;
@@ -61,7 +62,8 @@ struct FieldView {
       ascent[2] += weight[0] * weight[1] * slope[2] * value;
     }
     double const length = norm(ascent);
-    if (length > 0) normal = (1 / length) * ascent;
+    // Less than that is the round-off of equal numbers.
+    if (length > 1e-5 * band) normal = (1 / length) * ascent;
     return d;
   }
 };

@@ -83,7 +83,8 @@ void check(ParticleBody const& body) {
 }
 
 /// The noise, repeated, where the body is.
-std::vector<Vec3<double>> places_in(Solid const& solid, BlueNoise const& noise, double tile,
+std::vector<Vec3<double>> places_in(std::string const& name, Solid const& solid,
+                                    BlueNoise const& noise, double tile,
                                     Vec3<double> const& shift) {
   int first[3], last[3];
   double tiles = 1;
@@ -91,7 +92,13 @@ std::vector<Vec3<double>> places_in(Solid const& solid, BlueNoise const& noise, 
     double const low = (solid.lowest[c] - shift[c]) / tile,
                  high = (solid.highest[c] - shift[c]) / tile;
     tiles *= high - low + 1;
-    if (!(std::abs(low) < 1e9 && std::abs(high) < 1e9 && tiles < 1e7)) return {};
+    if (!(std::abs(low) < 1e9 && std::abs(high) < 1e9 && tiles < 1e7)) {
+      throw Error(
+          "body \"{}\": the box around it reaches over more cells than can be sampled: give a "
+          "coarser "
+          "grid, or make several bodies of it",
+          name);
+    }
     first[c] = static_cast<int>(std::floor(low));
     last[c] = static_cast<int>(std::floor(high));
   }
@@ -164,7 +171,7 @@ std::vector<Particle> sample(std::span<ParticleBody const> bodies, double dx,
     }
     double const tile = dx * std::cbrt(count / body.per_cell);
     Vec3<double> const shift{tile * random.unit(), tile * random.unit(), tile * random.unit()};
-    auto const places = places_in(body.solid, noise, tile, shift);
+    auto const places = places_in(body.name, body.solid, noise, tile, shift);
     if (places.empty()) {
       throw Error("body \"{}\" has no room for a particle: a cell of {} m is too large for it",
                   body.name, dx);

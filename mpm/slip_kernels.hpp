@@ -43,9 +43,15 @@ struct CountSlip {
   Positions rest;
   KOKKOS_FUNCTION int operator()(int n) const {
     Vec3<double> const x{double(rest(n, 0)), double(rest(n, 1)), double(rest(n, 2))};
+    Vec3<double> normal;
     int held = 0;
-    for (int k = 0; k < count; ++k) held += slides(boundaries(k)) && boundaries(k).holds(x);
+    for (int k = 0; k < count; ++k) held += holds(boundaries(k), x, normal);
     return held;
+  }
+  /// Where a boundary has no normal, too deep in it, there is nothing to hold along.
+  KOKKOS_FUNCTION static bool holds(Boundary const& b, Vec3<double> const& x,
+                                    Vec3<double>& normal) {
+    return slides(b) && b.distance(x, normal) <= 0 && dot(normal, normal) > 0;
   }
 };
 
@@ -60,7 +66,7 @@ struct ListSlip {
     for (int k = 0; k < of.count; ++k) {
       Boundary const& b = of.boundaries(k);
       SlipPair pair;
-      if (!slides(b) || b.distance(x, pair.normal) > 0) continue;
+      if (!of.holds(b, x, pair.normal)) continue;
       pair.boundary = k;
       pair.target = x + h * b.velocity_at(x);
       pair.separates = b.contact == BoundaryContact::separate;

@@ -105,6 +105,13 @@ Solid without(Solid const& solid, Solid const& hole) {
         ++all;
         left += !hole.holds(x);
       }
+  if (all == 0) {
+    throw Error(
+        "a body so thin that none of {}^3 points in the box around it is in it cannot have a hole: "
+        "make "
+        "it thicker, or leave the hole out",
+        n);
+  }
   if (left == 0) throw Error("a body of which nothing is left: the hole covers it");
   return {[inside = solid.holds, out = hole.holds](Vec3<double> const& x) {
             return inside(x) && !out(x);

@@ -65,7 +65,7 @@ Vec3<double> half_box(SourceSpec const& source) {
 }
 
 void check(SourceSpec const& source, double dx) {
-  constexpr int numbers[] = {0, 3, 1, 2, 0};
+  constexpr int numbers[] = {0, 3, 1, 2, 0, 0};
   int const count = numbers[static_cast<int>(source.shape)];
   if (count == 0) {
     throw Error("source \"{}\": its shape is no box, ball or cylinder: take one of them",

@@ -64,14 +64,15 @@ TriangleMesh surface_of(SceneBoundary const& boundary, std::filesystem::path con
   return surface;
 }
 
-/// Distances as fine as nodes can tell, and as far as particles see them.
+/// Distances as fine as nodes can tell, and as far as particles see them: 2.6 cells along a
+/// diagonal, and a cell of the field beyond.
 std::shared_ptr<DistanceField const> field_of(SceneBoundary const& boundary,
                                               std::filesystem::path const& file, double spacing) {
   try {
     TriangleMesh const surface = surface_of(boundary, file);
     Solid const solid = solid_in_surface(surface, file.string(), boundary.max_holes);
     return std::make_shared<DistanceField>(
-        distance_field(surface, solid, 0.5 * spacing, 2 * spacing, file.string()));
+        distance_field(surface, solid, 0.5 * spacing, 3.5 * spacing, file.string()));
   } catch (Error const& error) {
     throw Error("{}: {}", boundary.where, error.what());
   }

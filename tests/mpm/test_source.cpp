@@ -146,6 +146,8 @@ TEST_CASE("sources that cannot be are refused in one sentence", "[mpm][source]")
   bad = good;
   bad.shape = BoundaryShape::torus;
   refused(bad, 0.1, "no box, ball or cylinder");
+  bad.shape = BoundaryShape::field;
+  refused(bad, 0.1, "no box, ball or cylinder");
   bad = good;
   bad.size[0] = -1;
   refused(bad, 0.1, "a size of -1 m");
@@ -221,6 +223,15 @@ TEST_CASE("a field of distances is that of its surface", "[mpm][boundary]") {
     CHECK(norm(normal - other) < 1e-5);
   }
   CHECK(near > 100);
+  // Deeper than the band there is no ascent, and no normal.
+  specs[1].field =
+      std::make_shared<DistanceField>(distance_field(surface, solid, spacing, 0.06, "box"));
+  BoundaryList<Host> const narrow(specs);
+  for (Vec3<double> const& y : {Vec3<double>{0.01, 0.013, 0.017}, Vec3<double>{9, 9, 9}}) {
+    double const d = narrow.list()(1).distance(pose(y), other);
+    CHECK_THAT(std::abs(d), WithinAbs(0.06, 1e-6));
+    CHECK(norm(other) == 0);
+  }
   CHECK_THROWS_WITH(distance_field(surface, solid, 0.1, 0.05, "box"), ContainsSubstring("band"));
   CHECK_THROWS_WITH(distance_field(surface, solid, 1e-4, 0.05, "box"),
                     ContainsSubstring("raise grid.spacing"));
