@@ -18,17 +18,24 @@ namespace {
 /// The transfer policies behind one type.
 struct AnyTransfer {
   static constexpr char const* name = "chosen";
+  enum class Kind { apic, rpic, pic_flip } kind = Kind::apic;
   double flip = 0;
-  double keep = 1, turn = 0;  ///< C becomes keep C + turn C^T
   KOKKOS_FUNCTION Mat3<double> affine(Mat3<double> const& C) const {
-    return keep * C + turn * transpose(C);
+    switch (kind) {
+      case Kind::rpic:
+        return Rpic{}.affine(C);
+      case Kind::pic_flip:
+        return PicFlip{}.affine(C);
+      default:
+        return Apic{}.affine(C);
+    }
   }
 };
 
 AnyTransfer transfer_of(ParticleScene const& scene) {
-  if (scene.transfer == "rpic") return {0, 0.5, -0.5};
-  if (scene.transfer == "flip") return {scene.flip, 0, 0};
-  return {};
+  if (scene.transfer == "rpic") return {AnyTransfer::Kind::rpic, Rpic::flip};
+  if (scene.transfer == "flip") return {AnyTransfer::Kind::pic_flip, scene.flip};
+  return {AnyTransfer::Kind::apic, Apic::flip};
 }
 
 /// What comes out of a source in a step has gone on with the flow since then.
@@ -46,13 +53,16 @@ struct ComeOut {
   }
 };
 
-/// Mass-weighted squares of what nodes gain in velocity, and their mass.
+/// Mass-weighted squares of what free nodes gain in velocity, and their mass: what a boundary holds
+/// goes as it goes, whatever the step.
 template <class S, class Precision>
 struct Gained {
   using Scalar = typename Precision::position;
   VectorField<Scalar, S> before, after;
   Array<typename Precision::real, S> mass;
+  FixedMask<S> fixed;
   KOKKOS_FUNCTION void operator()(int n, Sums<double, 2>& sums) const {
+    if (fixed(n)) return;
     double square = 0;
     for (int c = 0; c < 3; ++c) {
       double const gain = double(after(n, c)) - double(before(n, c));
@@ -366,7 +376,8 @@ private:
     reducer_.provide(grid_.size(), 2);
     auto const& nodes = stepper_.nodes();
     auto const sums = reducer_.sum<2>(
-        "gained", grid_.size(), Gained<S, P>{grid_.velocity(), nodes.v, grid_.unknowns().mass});
+        "gained", grid_.size(),
+        Gained<S, P>{grid_.velocity(), nodes.v, grid_.unknowns().mass, grid_.unknowns().fixed});
     return sums[1] > 0 ? 0.5 * h * std::sqrt(sums[0] / sums[1]) : 0;
   }
   void take_back(std::vector<Particle> const& before) {
