@@ -31,10 +31,13 @@ private:
     try {
       return simulation_->step();
     } catch (Error const&) {
-      write_frame_off_grid();  // the state before what cannot be done
+      write_frame_off_grid(within_frame());  // the state before what cannot be done
       throw;
     }
   }
+
+  /// Of the steps of a frame some have been taken, but not all.
+  bool within_frame() const { return simulation_->time() != simulation_->steps() * scene_.step; }
 
   void add_to_line(Record& line) override {
     ParticleFrame const& frame = simulation_->frame();
@@ -57,7 +60,7 @@ private:
   void append_frame(ResultWriter& result) override {
     result.append(simulation_->time(), simulation_->positions(), simulation_->velocities(),
                   simulation_->scalars());
-    if (!scene_.output.vdb) return;
+    if (!scene_.output.vdb || within_frame()) return;
     write_grid_late(vdb, folder() / "vdb" / fmt::format("frame_{:05}.vdb", simulation_->steps()),
                     simulation_->grid());
   }

@@ -188,8 +188,8 @@ std::int64_t RunLoop::capacity() const {  // every so many steps, and the last o
   return (scene_.frames + scene_.output.every - 1) / scene_.output.every + 1;
 }
 
-void RunLoop::write_frame_off_grid() {
-  if (!on_grid()) append_frame(*result_);
+void RunLoop::write_frame_off_grid(bool within_step) {
+  if (within_step || !on_grid()) append_frame(*result_);
 }
 
 void RunLoop::take_step() {

@@ -66,8 +66,9 @@ protected:
   RunTotals& totals() { return totals_; }
   RunTotals const& totals() const { return totals_; }
   std::filesystem::path const& folder() const { return folder_; }
-  /// Writes the state as a frame if the last step did not: before an error leaves the run.
-  void write_frame_off_grid();
+  /// Writes the state as a frame if the last step did not, or if it is from within a step: before
+  /// an error leaves the run.
+  void write_frame_off_grid(bool within_step = false);
 
 private:
   void begin();
