@@ -207,7 +207,7 @@ int plan_particles(Scene const& scene) {
     }
   }
   fmt::print("  metric        evens out stiffness and mass: {}\n", particle_preconditioner(solver));
-  if (particle_preconditioner(solver) == "multigrid") {
+  if (has_strong_cycle(solver)) {
     std::string const& strong = solver.text("strong_cycle");
     fmt::print("                {}\n",
                strong == "auto" ? "in steps that it has not ended after 400 iterations, a stronger "

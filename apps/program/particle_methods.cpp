@@ -1,4 +1,5 @@
 #include <taut/apps/program/particle_methods_impl.hpp>
+#include <taut/core/report/error.hpp>
 
 #include <fmt/core.h>
 
@@ -28,19 +29,64 @@ public:
   }
 };
 
-}  // namespace
-
-std::string particle_preconditioner(SolverOptions const& options) {
-  std::string const& method = options.text("method");
+/// The metric of a method that comes with one; empty: it takes the one that is asked for.
+std::string metric_of(std::string const& method) {
   if (method == "lbfgs_h") return "inverse_by_pcg";
   if (method == "pn_sgspcg") return "symmetric_gauss_seidel";
   if (method.starts_with("pn_pcg") || method == "gast15" || method == "lbfgs_plain") {
     return "block_jacobi";
   }
+  bool const has_cycle = method.starts_with("hot") || method == "lbfgs_gmg" ||
+                         method == "pn_mgpcg" || method == "pn_gmgpcg" || method == "admm";
+  return has_cycle ? "multigrid" : "";
+}
+
+}  // namespace
+
+std::string particle_preconditioner(SolverOptions const& options) {
+  std::string const own = metric_of(options.text("method"));
+  if (!own.empty()) return own;
   std::string const& asked = options.text("preconditioner");
-  bool const hot = method.starts_with("hot") || method.ends_with("gmg") || method == "pn_mgpcg" ||
-                   method == "pn_gmgpcg";
-  return asked == "auto" || hot ? "multigrid" : asked;
+  return asked == "auto" ? "multigrid" : asked;
+}
+
+bool has_strong_cycle(SolverOptions const& options) {
+  return metric_of(options.text("method")).empty() &&
+         particle_preconditioner(options) == "multigrid";
+}
+
+void refuse_without_effect(Section const& solver, SolverOptions const& options) {
+  std::string const& method = options.text("method");
+  auto const refuse = [&](char const* key, std::string const& why) {
+    if (solver.find(key) == nullptr) return;
+    throw Error("{}: {} has no effect: {}", solver.at(key).place, solver.path(key), why);
+  };
+  for (char const* key : {"regions", "islands", "rigid_predictor", "sleep_speed", "sleep_steps"}) {
+    refuse(key, "it is of meshes; leave it out");
+  }
+  if (options.text("curvature") != "project") {
+    refuse("curvature", "that of material points is projected exactly; leave it out");
+  }
+  if (method.starts_with("pn_") || method == "gast15") {
+    refuse("hessian",
+           fmt::format("{} has its own; leave it out, or use method = \"newton\"", method));
+  }
+  std::string const own = metric_of(method);
+  if (!own.empty() && options.text("preconditioner") != "auto") {
+    refuse("preconditioner",
+           fmt::format("that of {} is {}; leave it out, or use method = \"lbfgs\"", method, own));
+  }
+  if (method == "admm") {
+    for (char const* key : {"line_search", "safeguard"}) {
+      refuse(key, "admm takes its steps as they are; leave it out");
+    }
+  }
+  if (options.text("strong_cycle") == "always" && !has_strong_cycle(options)) {
+    refuse("strong_cycle",
+           fmt::format("{} with {} has no strong cycle; leave it out, or use method "
+                       "= \"lbfgs\" with multigrid",
+                       method, particle_preconditioner(options)));
+  }
 }
 
 std::span<MethodTitle const> particle_method_titles() {

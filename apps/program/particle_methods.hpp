@@ -44,5 +44,10 @@ std::span<MethodTitle const> particle_method_titles();
 
 /// The preconditioner that a scene of particles takes: never "auto".
 std::string particle_preconditioner(SolverOptions const& options);
+/// Whether its cycle can be a strong one (solver.strong_cycle).
+bool has_strong_cycle(SolverOptions const& options);
+/// Throws Error for a key that [solver] says and that changes nothing of material points with this
+/// method.
+void refuse_without_effect(Section const& solver, SolverOptions const& options);
 
 }  // namespace taut

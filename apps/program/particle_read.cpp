@@ -184,8 +184,9 @@ SceneBoundary read_boundary(Section const& s, Scene const& scene) {
   if (s.find("release")) {
     boundary.release = s.number("release", time_range);
     if (boundary.inside || std::holds_alternative<HalfSpaceShape>(boundary.shape))
-      throw Error("{}: {}: only what bodies are outside of can be taken away: leave the key out",
-                  s.at("release").place, s.path("release"));
+      throw Error("{}: {}: {} cannot be released: use a box, or leave the key out",
+                  s.at("release").place, s.path("release"),
+                  boundary.inside ? "a boundary that bodies are in" : "a half space");
   }
   constexpr std::array<std::string_view, 3> laws{"stick", "slip", "separate"};
   std::string const law = s.choice("contact", laws, "stick");
@@ -226,6 +227,11 @@ ParticleScene read_particle_scene(Section const& root, Scene const& scene) {
   constexpr std::array<std::string_view, 3> transfers{"apic", "rpic", "flip"};
   p.transfer = grid.choice("transfer", transfers, p.transfer);
   p.flip = grid.number("flip", {.min = 0, .max = 1}, p.flip);
+  if (grid.find("flip") && p.transfer != "flip")
+    throw Error(
+        "{}: {} has no effect where transfer = \"{}\": leave it out, or use transfer = "
+        "\"flip\"",
+        grid.at("flip").place, grid.path("flip"), p.transfer);
   double const per_cell = grid.number("per_cell", {.min = 0, .max = 1e3, .open_min = true}, 8.0);
   p.ghost_penalty = grid.number("ghost_penalty", {.min = 0, .max = 1}, p.ghost_penalty);
   p.cfl = grid.number("cfl", {.min = 0, .max = 10, .open_min = true, .unit = "cells"}, p.cfl);

@@ -1,3 +1,4 @@
+#include <taut/apps/program/particle_methods.hpp>
 #include <taut/apps/program/scene.hpp>
 #include <taut/apps/program/scene_document.hpp>
 #include <taut/apps/program/scene_read.hpp>
@@ -101,8 +102,7 @@ Scene resolve_particles(Section const& root, Scene scene) {
     throw Error(
         "{}: solver.precision = \"{}\" is compiled for meshes alone: material points take fp64",
         root.place(), precision);
-  if (scene.solver.number("sleep_speed") > 0)
-    throw Error("{}: solver.sleep_speed is of meshes: leave it out", root.place());
+  if (solver) refuse_without_effect(*solver, scene.solver);
   return scene;
 }
 

@@ -2,6 +2,7 @@
 // on bitwise, methods agree, and mistakes are answered by a sentence.
 #include "scene_run.hpp"
 
+#include <taut/apps/program/particle_methods.hpp>
 #include <taut/apps/program/particle_simulation.hpp>
 #include <taut/core/report/error.hpp>
 
@@ -479,6 +480,36 @@ material = {{ model = "{}", young = {}, poisson = 0.3, density = 2000 }}
   CHECK(worst < 1e-5 * 0.1);
 }
 
+TEST_CASE("a frame that cannot be ended leaves what came before the step that failed",
+          "[particles]") {
+  // It falls faster and faster, until it would cross too much of a cell in the middle of a frame.
+  std::string const high = replaced(plain, "translate = [0, 0.2, 0]", "translate = [0, 2, 0]");
+  SceneRun const run(
+      "cube.toml",
+      replaced(replaced(high, "step = 0.01", "step = 0.5"), "spacing = 0.1",
+               "spacing = 0.1\nlongest_step = 0.02\ncfl = 10\ncrossing = 0.22\nhalvings = 0"));
+  CHECK_THROWS_MATCHES(run_command(run.options), Error,
+                       MessageMatches(ContainsSubstring("was halved 0 times")));
+  auto const result = run.result();
+  REQUIRE(result.frames() == 2);
+  CHECK(result.positions(1)[0][1] < result.positions(0)[0][1] - 0.02);
+}
+
+TEST_CASE("methods that take no strong cycle promise none", "[particles]") {
+  SolverOptions options;
+  for (char const* method : {"hot", "lbfgs_gmg", "pn_mgpcg", "pn_gmgpcg", "admm"}) {
+    options.set("method", method);
+    CHECK_FALSE(has_strong_cycle(options));
+    options.set("preconditioner", "jacobi");
+    CHECK(particle_preconditioner(options) == "multigrid");
+    options.set("preconditioner", "auto");
+  }
+  for (char const* method : {"lbfgs", "dk", "newton"}) {
+    options.set("method", method);
+    CHECK(has_strong_cycle(options));
+  }
+}
+
 TEST_CASE("mistakes in a scene of material points are answered by a sentence", "[particles]") {
   refused("spacing = 0.1", "spacing = 0", "grid.spacing is 0: it must be");
   refused("spacing = 0.1", "spacing = 0.5",
@@ -514,6 +545,29 @@ TEST_CASE("mistakes in a scene of material points are answered by a sentence", "
   refused("spacing = 0.1", "spacing = 0.1\nkernel = \"cubi\"", "grid.kernel is 'cubi'");
   refused("spacing = 0.1", "spacing = 0.1\nghost_penalty = -1", "grid.ghost_penalty is -1");
   refused("spacing = 0.1", "spacing = 0.1\ntransfer = \"pic\"", "grid.transfer is 'pic'");
+  refused("spacing = 0.1", "spacing = 0.1\nflip = 0.9", "grid.flip has no effect where transfer");
+  refused("contact = \"separate\"", "release = 1", "a half space cannot be released: use a box");
+  for (auto const& [lines, sentence] : std::vector<std::pair<std::string, std::string>>{
+           {"islands = false", "solver.islands has no effect: it is of meshes"},
+           {"regions = true", "solver.regions has no effect: it is of meshes"},
+           {"rigid_predictor = true", "solver.rigid_predictor has no effect: it is of meshes"},
+           {"sleep_speed = 0.1", "solver.sleep_speed has no effect: it is of meshes"},
+           {"curvature = \"clamp\"", "that of material points is projected exactly"},
+           {"method = \"pn_pcg\"\nhessian = \"matrix_free\"", "pn_pcg has its own"},
+           {"method = \"hot\"\npreconditioner = \"jacobi\"", "that of hot is multigrid"},
+           {"method = \"lbfgs_h\"\npreconditioner = \"jacobi\"", "is inverse_by_pcg"},
+           {"method = \"admm\"\npreconditioner = \"jacobi\"", "that of admm is multigrid"},
+           {"method = \"admm\"\nline_search = \"exact\"", "admm takes its steps as they are"},
+           {"method = \"admm\"\nsafeguard = false", "admm takes its steps as they are"},
+           {"method = \"hot\"\nstrong_cycle = \"always\"", "has no strong cycle"},
+           {"preconditioner = \"jacobi\"\nstrong_cycle = \"always\"", "has no strong cycle"}}) {
+    refused("[grid]", "[solver]\n" + lines + "\n\n[grid]", sentence);
+  }
+  SceneRun const allowed("cube.toml",
+                         replaced(plain, "[grid]",
+                                  "[solver]\nmethod = \"hot\"\npreconditioner = \"auto\"\n"
+                                  "curvature = \"project\"\n\n[grid]"));
+  CHECK(allowed.scene().solver.text("method") == "hot");
   refused("gravity = [0, -10, 0]", "gravity = [0, -10, 0]\n[solver]\nmethod = \"magic\"",
           "solver.method is 'magic'");
   SceneRun const meshes("plain.toml", plain_scene + "\n[[boundary]]\nname = \"a\"\n");
