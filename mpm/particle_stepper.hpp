@@ -58,6 +58,9 @@ struct ParticleStepReport {
   double time_step = 0;  ///< taken, s
   int halvings = 0;      ///< of the step that was asked for
   int nodes = 0, patches = 0;
+  /// What lags (LaggedTerm) would still change the step: the passes were not enough for it to
+  /// settle.
+  bool unsettled = false;
   double travel_cells = 0;  ///< bound of how far a particle went, cells
 };
 
@@ -178,6 +181,8 @@ public:
       }
     }
     report.time_step = h;
+    // What is taken anew here nobody sees: the next step takes its own.
+    report.unsettled = scene.relag(state_.x);
     grid.to_particles(particles, state_.x, state_.v, h, transfer_, flow_);
     Space::instance().fence("taut: particle step");
     return report;

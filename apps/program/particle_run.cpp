@@ -46,6 +46,7 @@ private:
     totals().most_nodes = std::max(totals().most_nodes, double(frame.nodes));
     line.set("grid_steps", frame.steps)
         .set("grid_steps_converged", frame.converged_steps)
+        .set("grid_steps_unsettled", frame.unsettled_steps)
         .set("halvings", frame.halvings)
         .set("particles", simulation_->particle_count())
         .set("nodes", frame.nodes)

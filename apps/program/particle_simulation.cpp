@@ -119,6 +119,7 @@ public:
       add(report.minimiser, all);
       ++frame_.steps;
       frame_.converged_steps += report.minimiser.converged();
+      frame_.unsettled_steps += report.unsettled;
       frame_.halvings += report.halvings;
       frame_.nodes = std::max(frame_.nodes, report.nodes);
       frame_.travel_cells = std::max(frame_.travel_cells, report.travel_cells);

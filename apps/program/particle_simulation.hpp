@@ -14,6 +14,7 @@ struct ParticleFrame {
   int steps = 0;            ///< of the grid
   int halvings = 0;         ///< of these, in all
   int converged_steps = 0;  ///< of these
+  int unsettled_steps = 0;  ///< of these, ParticleStepReport::unsettled
   int nodes = 0;            ///< the most that the grid had
   double travel_cells = 0;  ///< the farthest that a particle went in a step of the grid (a bound)
 };

@@ -239,6 +239,20 @@ TEST_CASE("friction slows a body down by mu g, and holds it where that is enough
   CHECK(std::abs(mean_velocity(resting.run(30, 0.01))[0]) < 0.05);
 }
 
+TEST_CASE("a step says whether the passes were enough for what lags", "[mpm][boundary]") {
+  // It lands, and slides.
+  auto const unsettled = [](int passes) {
+    Run run(cube({2, -1, 0}), {floor_of(BoundaryContact::separate, 0.3)}, {0, -10, 0}, passes);
+    int sum = 0;
+    for (int n = 0; n < 3; ++n) {
+      sum += run.stepper.step(run.scene, run.grid, run.particles, 0.01, run.boundaries).unsettled;
+    }
+    return sum;
+  };
+  CHECK(unsettled(1) > 0);
+  CHECK(unsettled(20) == 0);
+}
+
 TEST_CASE("a corner of three planes holds a body in all of them", "[mpm][boundary]") {
   // Planes that are not at right angles, and a body that is pushed into their corner.
   std::vector<BoundarySpec> specs;
