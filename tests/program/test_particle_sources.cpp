@@ -245,6 +245,35 @@ material = { young = 1e5, poisson = 0.3, density = 1000 }
           "more than grid.time_error asks for");
 }
 
+TEST_CASE("what a boundary holds is no error of a step", "[particles]") {
+  // A soft cube on a tray that is pulled away: nodes in the tray go with it at once.
+  std::string const text = R"(name = "tray"
+gravity = [0, 0, 0]
+
+[time]
+step = 0.02
+frames = 1
+
+[grid]
+spacing = 0.1
+time_error = 4e-4
+
+[[object]]
+name = "cube"
+shape = { kind = "box", size = [0.4, 0.4, 0.4] }
+translate = [0, 0.2, 0]
+material = { young = 100, poisson = 0.3, density = 1000 }
+
+[[boundary]]
+name = "tray"
+shape = { kind = "half_space" }
+motion = [{ end = 1, velocity = [1, 0, 0] }]
+)";
+  SceneRun const run("tray.toml", text);
+  REQUIRE(run_command(run.options) == 0);
+  CHECK(int(run.summary().at("grid_steps")) <= 2);
+}
+
 TEST_CASE("the grid and the surface are written on request", "[particles][output]") {
   SceneRun const run("jet.toml", jet, {"output.vdb=true", "output.every=2"});
   REQUIRE(run_command(run.options) == 0);
