@@ -430,7 +430,7 @@ TEST_CASE("what turns with an obstacle does not slip, wherever its contacts are 
   Vec3<double> const axis{-3, lowest - 0.5 * dhat, 1}, along{0.2, 0.1, -0.1};
   Obstacle<HalfSpace, Normalised<LogBarrier>, GivenStiffness, Fp64> const plate(
       unknowns, scene.surface, scene.rest, HalfSpace{axis},
-      {.dhat = dhat, .stiffness = {.pressure = pressure}});
+      {.dhat = dhat, .start_share = 0, .stiffness = {.pressure = pressure}});
   Friction<Fp64> friction(unknowns, scene.rest, {.stick_speed = stick_speed});
   friction.add(plate, 0.4);
   RigidPose pose{turn_matrix({{0, 1, 0}, angle})};

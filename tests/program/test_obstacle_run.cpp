@@ -145,13 +145,13 @@ frames = 40
 name = "lower"
 shape = { kind = "box", size = [0.2, 0.2, 0.2], resolution = 2 }
 translate = [0, 0.1001, 0]
-material = { young = 1e6, poisson = 0.4, density = 1000 }
+material = { young = 1e8, poisson = 0.4, density = 1000 }
 
 [[object]]
 name = "upper"
 shape = { kind = "box", size = [0.2, 0.2, 0.2], resolution = 2 }
 translate = [0.03, 0.3002, 0]
-material = { young = 1e6, poisson = 0.4, density = 1000 }
+material = { young = 1e8, poisson = 0.4, density = 1000 }
 
 [[obstacle]]
 name = "floor"
@@ -175,11 +175,11 @@ TEST_CASE("what is put down closer than dhat stays there", "[obstacle]") {
   CHECK(run_command(run.options) == 0);
   CHECK(run.summary().at("steps_converged") == 40);
   ResultReader const result = run.result();
-  // Soft cubes sag by less than a millimetre; nothing is thrown, and no gap closes or opens.
+  // Gaps of a tenth of a millimetre close, and nothing is thrown.
   CHECK(fastest(result) < 0.03);
   auto const first = result.positions(0), last = result.positions(result.frames() - 1);
   for (std::size_t v = 0; v < first.size(); ++v) {
-    CHECK(std::abs(last[v][1] - first[v][1]) < 1e-3);
+    CHECK(std::abs(last[v][1] - first[v][1]) < 3e-4);
   }
   SceneRun thrown("scene.toml", put_down, {"contact.start_share=0"});
   CHECK(run_command(thrown.options) == 0);
