@@ -209,7 +209,8 @@ TEST_CASE("surfaces and bodies that cannot be are refused in one sentence", "[mp
       placed(solid_box({1e3, 1e-6, 1e-6}), {turn_matrix({{0.6, 0, 0.8}, 0.7}), {0, 0, 0}});
   CHECK_THROWS_WITH(sample_one(needle, 0.01),
                     ContainsSubstring("\"it\": the box around it reaches over more cells"));
-  CHECK_THROWS_WITH(without(solid_torus(1, 1e-6), solid_ball(2)), ContainsSubstring("a body so thin"));
+  CHECK_THROWS_WITH(without(solid_torus(1, 1e-6), solid_ball(2)),
+                    ContainsSubstring("a body so thin"));
   CHECK_THROWS_WITH(without(solid_ball(1), solid_ball(2)), ContainsSubstring("the hole covers it"));
   ParticleBody const a{"anvil", solid_box({1, 1, 1})};
   ParticleBody const b{"hammer", placed(solid_ball(0.3), {identity3<double>(), {0, 0.7, 0}})};
