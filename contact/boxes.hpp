@@ -73,12 +73,18 @@ KOKKOS_FORCEINLINE_FUNCTION float longest_side(SearchBox const& b) {
   return longest;
 }
 
-/// The class of a box or a length by size: c where the longest side is in [2^c, 2^(c + 1)).
-using SizeClass = int;
-inline constexpr SizeClass smallest_class = -127, largest_class = 128;
+/// Of two boxes of a set the one of lower rank asks for the other: the first, but those that are
+/// much longer than most come last. So a floor of two large triangles costs each of its neighbours
+/// a step, and not one thread the whole scene.
+using Rank = int;
+inline constexpr Rank lowest_rank = 0, no_rank = -1;
+inline constexpr int most_ranked = 1 << 29;
 
-KOKKOS_FORCEINLINE_FUNCTION SizeClass size_class(float longest) {
-  return static_cast<int>(Kokkos::bit_cast<std::uint32_t>(longest) >> 23 & 255u) - 127;
+/// Of box i of a set whose boxes are about `length` long.
+KOKKOS_FORCEINLINE_FUNCTION Rank rank_of(int i, float longest, float length) {
+  int level = 0;
+  for (float bound = 16 * length; level < 3 && !(longest < bound); bound *= 16) ++level;
+  return level * most_ranked + i;
 }
 
 namespace kernels {
@@ -178,10 +184,11 @@ struct Motion {
   }
 };
 
-/// n boxes, and one that encloses the vertices.
+/// n boxes with their ranks, and one box that encloses the vertices.
 template <class S>
 struct BoxSet {
   Kokkos::View<SearchBox*, typename S::memory> box;
+  Kokkos::View<Rank*, typename S::memory> rank;
   int count = 0;
   SearchBox all = empty_box();
 };
@@ -245,7 +252,9 @@ struct PrimitiveBoxes {
   typename SurfaceViews<S>::Indices corner;
   Kokkos::View<SearchBox const*, typename S::memory> of_vertex;
   Kokkos::View<SearchBox*, typename S::memory> box;
+  Kokkos::View<Rank*, typename S::memory> rank;
   double budget;  ///< of round-off, of the longest side
+  float length;   ///< of most boxes, m
 
   KOKKOS_FUNCTION void operator()(int i) const {
     SearchBox b = of_vertex(corner(N * i));
@@ -256,6 +265,7 @@ struct PrimitiveBoxes {
       b.high[c] = round_up(double(b.high[c]) + grow);
     }
     box(i) = b;
+    rank(i) = rank_of(i, longest_side(b), length);
   }
 };
 
@@ -266,12 +276,14 @@ template <class S>
 class SurfaceBoxes {
 public:
   SurfaceBoxes() = default;
-  explicit SurfaceBoxes(SurfaceViews<S> const& surface)
+  /// `edge_length`: mean length of the surface's edges, m. Throws Error if there are too many.
+  SurfaceBoxes(SurfaceViews<S> const& surface, double edge_length)
       : surface_(surface),
+        length_(static_cast<float>(edge_length)),
         of_vertex_("box_of_vertex", surface.object.extent(0)),
-        points_{Boxes("vertex_box", surface.vertices()), surface.vertices()},
-        edges_{Boxes("edge_box", surface.edges()), surface.edges()},
-        triangles_{Boxes("triangle_box", surface.triangles()), surface.triangles()} {}
+        points_(make_set(surface.vertices())),
+        edges_(make_set(surface.edges())),
+        triangles_(make_set(surface.triangles())) {}
 
   /// So that primitives that come closer than `radius` (m) during the motion have boxes that
   /// overlap, wherever each vertex is within `own_radius` (m, per vertex of the mesh) of where the
@@ -316,8 +328,14 @@ public:
   BoxSet<S> const& triangles() const { return triangles_; }
 
 private:
-  using Boxes = Kokkos::View<SearchBox*, typename S::memory>;
-
+  static BoxSet<S> make_set(int count) {
+    if (count > most_ranked) {
+      throw Error("broad phase: a surface of {} primitives of a kind: at most {} can be searched",
+                  count, most_ranked);
+    }
+    return {Kokkos::View<SearchBox*, typename S::memory>("box", count),
+            Kokkos::View<Rank*, typename S::memory>("box_rank", count), count};
+  }
   template <class Precision>
   void check(Motion<Precision, S> const& motion) const {
     std::size_t const n = of_vertex_.extent(0);
@@ -333,11 +351,14 @@ private:
   template <int N>
   void primitives(char const* name, typename SurfaceViews<S>::Indices const& corner, double budget,
                   BoxSet<S> const& to) const {
-    for_each<S>(name, to.count, kernels::PrimitiveBoxes<S, N>{corner, of_vertex_, to.box, budget});
+    for_each<S>(
+        name, to.count,
+        kernels::PrimitiveBoxes<S, N>{corner, of_vertex_, to.box, to.rank, budget, length_});
   }
 
   SurfaceViews<S> surface_;
-  Boxes of_vertex_;
+  float length_ = 0;
+  Kokkos::View<SearchBox*, typename S::memory> of_vertex_;
   BoxSet<S> points_, edges_, triangles_;
 };
 

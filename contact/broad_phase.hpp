@@ -7,14 +7,13 @@
 // for all, and is here: the list of candidates does not depend on the policy. It is sorted by the
 // one who asks, then by who is found, so it does not depend on the number of threads either.
 //
-// Points ask for triangles. Of two edges the one in the smaller size class asks, the first in the
-// surface if they are alike. So a floor of two large triangles costs each of its neighbours a step
-// and not one thread the whole scene. For this a policy may pass over boxes of a class that is too
-// small.
+// Points ask for triangles. Of two edges the one of lower rank asks (boxes.hpp); for this a policy
+// may pass over boxes whose rank is too low.
 #pragma once
 
 #include <taut/contact/boxes.hpp>
 #include <taut/contact/candidates.hpp>
+#include <taut/core/math/bits.hpp>
 
 #include <concepts>
 
@@ -25,23 +24,24 @@ struct QueryGroup {
   static constexpr int most = 8;
   int count = 0;
   SearchBox box[most];
-  SizeClass least[most];
+  Rank least[most];
 };
 
 /// A set of boxes that is searched from kernels; copied to the device.
 /// `visit(box, least, visitor)` calls `visitor(j)` once for each box j of the set that overlaps
-/// `box` and is in the size class `least` or above, in any order; it may show smaller ones too.
-/// A GroupIndex also has `visit_group(group, visitor)`, which calls `visitor(a, j)` for box a of a
-/// group: it goes through the set once for all of them.
+/// `box` and is of the rank `least` or above, in any order; it may show lower ones too.
+/// A GroupIndex also has `visit_group(group, visitor)`, which goes through the set once for a group
+/// of boxes and calls `visitor(bits, j)`, with bit a for box a of the group: once for each a and j,
+/// several a in a call.
 template <class I>
-concept BoxIndex = requires(I const& index, SearchBox const& box, SizeClass least,
+concept BoxIndex = requires(I const& index, SearchBox const& box, Rank least,
                             void (*visitor)(int)) {
   {index.visit(box, least, visitor)};
 };
 
 template <class I>
 concept GroupIndex = BoxIndex<I> &&
-    requires(I const& index, QueryGroup const& group, void (*visitor)(int, int)) {
+    requires(I const& index, QueryGroup const& group, void (*visitor)(unsigned, int)) {
   {index.visit_group(group, visitor)};
 };
 
@@ -66,7 +66,7 @@ public:
     int count;
 
     template <class Visitor>
-    KOKKOS_FUNCTION void visit(SearchBox const& query, SizeClass, Visitor&& visitor) const {
+    KOKKOS_FUNCTION void visit(SearchBox const& query, Rank, Visitor&& visitor) const {
       for (int j = 0; j < count; ++j) {
         if (overlap(query, box(j))) visitor(j);
       }
@@ -90,92 +90,112 @@ struct Held {
   FixedMask<S> fixed;  ///< empty: none is
   bool together;       ///< only those that are fixed by one mark
 
-  KOKKOS_INLINE_FUNCTION bool operator()(int const (&v)[4]) const {
+  /// Of a pair, or of some of its vertices: false if others cannot make it true.
+  template <int n>
+  KOKKOS_INLINE_FUNCTION bool operator()(int const (&v)[n]) const {
     if (fixed.extent(0) == 0) return false;
     std::uint8_t const mark = fixed(v[0]);
-    for (int a = 0; a < 4; ++a) {
+    for (int a = 0; a < n; ++a) {
       if (fixed(v[a]) == 0 || (together && fixed(v[a]) != mark)) return false;
     }
     return true;
   }
 };
 
+/// The vertices of points (one), edges (two) or triangles (three) of a surface.
+template <int corners, class S>
+KOKKOS_FUNCTION typename SurfaceViews<S>::Indices const& corners_of(
+    SurfaceViews<S> const& surface) {
+  if constexpr (corners == 1) {
+    return surface.vertex;
+  } else if constexpr (corners == 2) {
+    return surface.edge;
+  } else {
+    return surface.triangle;
+  }
+}
+
 /// The vertices of a pair of primitives, as `PairIds` has them: of a point and a triangle of the
 /// surface, or of two of its edges.
 template <PairKind kind, class S>
 KOKKOS_FUNCTION void vertices_of(SurfaceViews<S> const& surface, int first, int second,
                                  int (&v)[4]) {
-  if constexpr (kind == PairKind::point_triangle) {
-    v[0] = surface.vertex(first);
-    for (int a = 0; a < 3; ++a) v[1 + a] = surface.triangle(3 * second + a);
-  } else {
-    for (int a = 0; a < 2; ++a) {
-      v[a] = surface.edge(2 * first + a);
-      v[2 + a] = surface.edge(2 * second + a);
-    }
+  constexpr int corners = kind == PairKind::point_triangle ? 1 : 2;
+  for (int a = 0; a < corners; ++a) v[a] = corners_of<corners>(surface)(corners * first + a);
+  for (int a = corners; a < 4; ++a) {
+    v[a] = corners_of<4 - corners>(surface)((4 - corners) * second + a - corners);
   }
 }
 
-/// Of what pairs are made: `accept(asker(i), j)` says whether box i of those that ask and box j of
-/// those that are asked for make one; then `order(i, j, ij)` are its primitives in their order.
-/// These are what all that are made of points and triangles share, and all that are made of edges.
-template <class S>
-struct PointTrianglePairs {
-  static constexpr PairKind kind = PairKind::point_triangle;
-  SurfaceViews<S> surface;
-  Held<S> held;
-
-  KOKKOS_FUNCTION SizeClass least(int) const { return smallest_class; }
-  /// Whether a point and a triangle share no vertex and are not held.
-  KOKKOS_FUNCTION bool pair(int const (&v)[4]) const {
-    return v[0] != v[1] && v[0] != v[2] && v[0] != v[3] && !held(v);
-  }
+/// Up to n primitives that ask together, side by side.
+template <int corners, int n>
+struct AskingGroup {
+  int index[n] = {}, vertex[corners][n] = {};
+  Rank least[n] = {};
 };
-template <class S>
-struct EdgePairs {
-  static constexpr PairKind kind = PairKind::edge_edge;
+
+/// Of what pairs are made: of primitives that ask and have `corners` vertices, and others that they
+/// ask for. `accept(group, bits, j)` says which of the group, of those that `bits` names, make a
+/// pair with primitive j; then `order(i, j, ij)` are the two in their order. This is what all
+/// pairings share.
+template <int corners, class S>
+struct PairingBase {
+  static constexpr PairKind kind = corners == 2 ? PairKind::edge_edge : PairKind::point_triangle;
+  static constexpr int others = 4 - corners;  ///< vertices of what is asked for
+  template <int n>
+  using Group = AskingGroup<corners, n>;
   SurfaceViews<S> surface;
   Held<S> held;
 
+  KOKKOS_FUNCTION Rank least(int) const { return lowest_rank; }
   KOKKOS_FUNCTION void order(int i, int j, int (&ij)[2]) const {
-    ij[0] = Kokkos::min(i, j), ij[1] = Kokkos::max(i, j);
+    bool const in_order = corners == 1 || (corners == 2 && i < j);
+    ij[0] = in_order ? i : j, ij[1] = in_order ? j : i;
   }
-  /// Whether an edge with these ends and edge j share no vertex and are not held.
-  KOKKOS_FUNCTION bool pair(int const (&end)[2], int j) const {
-    int const v[4] = {end[0], end[1], surface.edge(2 * j), surface.edge(2 * j + 1)};
-    return v[0] != v[2] && v[0] != v[3] && v[1] != v[2] && v[1] != v[3] && !held(v);
+
+protected:
+  /// Of the group, those that share no vertex with primitive j, and are not held with it.
+  template <int n>
+  KOKKOS_FUNCTION unsigned pairs(Group<n> const& group, unsigned bits, int j) const {
+    int of_j[others];
+    for (int c = 0; c < others; ++c) of_j[c] = corners_of<others>(surface)(others * j + c);
+    bits &= bits_where<n>([&](int b) {
+      bool apart = true;
+      for (int a = 0; a < corners; ++a)
+        for (int c = 0; c < others; ++c) apart &= group.vertex[a][b] != of_j[c];
+      return apart;
+    });
+    if (!held(of_j)) return bits;
+    for (unsigned rest = bits; rest != 0; rest &= rest - 1) {
+      int const b = lowest_bit(rest);
+      int v[4];
+      for (int a = 0; a < corners; ++a) v[a] = group.vertex[a][b];
+      for (int c = 0; c < others; ++c) v[corners + c] = of_j[c];
+      if (held(v)) bits &= ~(1u << b);
+    }
+    return bits;
   }
 };
 
 template <class S>
-struct PairPointTriangle : PointTrianglePairs<S> {
-  struct Asker {
-    int vertex;
-  };
-  KOKKOS_FUNCTION Asker asker(int i) const { return {this->surface.vertex(i)}; }
-  KOKKOS_FUNCTION void order(int i, int j, int (&ij)[2]) const { ij[0] = i, ij[1] = j; }
-  KOKKOS_FUNCTION bool accept(Asker const& i, int j) const {
-    auto const& triangle = this->surface.triangle;
-    return this->pair({i.vertex, triangle(3 * j), triangle(3 * j + 1), triangle(3 * j + 2)});
+struct PairPointTriangle : PairingBase<1, S> {
+  template <int n>
+  KOKKOS_FUNCTION unsigned accept(AskingGroup<1, n> const& group, unsigned bits, int j) const {
+    return this->pairs(group, bits, j);
   }
 };
 
+/// Of two edges the one of lower rank asks.
 template <class S>
-struct PairEdgeEdge : EdgePairs<S> {
-  Kokkos::View<SearchBox const*, typename S::memory> box;
+struct PairEdgeEdge : PairingBase<2, S> {
+  Kokkos::View<Rank const*, typename S::memory> rank;
 
-  struct Asker {
-    int index, vertex[2];
-    SizeClass least;
-  };
-  KOKKOS_FUNCTION Asker asker(int i) const {
-    return {i, {this->surface.edge(2 * i), this->surface.edge(2 * i + 1)}, least(i)};
-  }
-  KOKKOS_FUNCTION SizeClass least(int i) const { return size_class(longest_side(box(i))); }
-  KOKKOS_FUNCTION bool accept(Asker const& i, int j) const {
-    if (!this->pair(i.vertex, j)) return false;
-    SizeClass const class_j = least(j);
-    return i.least != class_j ? i.least < class_j : i.index < j;
+  KOKKOS_FUNCTION Rank least(int i) const { return rank(i); }
+  template <int n>
+  KOKKOS_FUNCTION unsigned accept(AskingGroup<2, n> const& group, unsigned bits, int j) const {
+    Rank const of_j = rank(j);
+    bits &= bits_where<n>([&](int b) { return group.least[b] < of_j; });
+    return bits == 0 ? 0 : this->pairs(group, bits, j);
   }
 };
 
@@ -210,6 +230,16 @@ struct Askers {
   KOKKOS_FUNCTION int operator()(int k) const { return name.extent(0) > 0 ? name(k) : k; }
 };
 
+/// Makes primitive i the one of place a in a group.
+template <class Pairing, int corners, int n>
+KOKKOS_FUNCTION void take_in(Pairing const& pairing, int i, AskingGroup<corners, n>& group, int a) {
+  group.index[a] = i;
+  for (int c = 0; c < corners; ++c) {
+    group.vertex[c][a] = corners_of<corners>(pairing.surface)(corners * i + c);
+  }
+  group.least[a] = pairing.least(i);
+}
+
 /// What a group of boxes finds: how many partners each has, and the first few of them.
 template <class S, class Index, class Pairing>
 struct FindPairs {
@@ -225,36 +255,39 @@ struct FindPairs {
   struct Visitor {
     FindPairs const& find;
     int first;
-    typename Pairing::Asker asker[group];
+    typename Pairing::template Group<group> askers = {};
     int count[group] = {};
-    KOKKOS_FUNCTION void operator()(int a, int j) {
-      if (!find.pairing.accept(asker[a], j)) return;
-      if (count[a] < noted_partners) find.partner(first_noted(first + a) + count[a]) = j;
-      ++count[a];
+    KOKKOS_FUNCTION void operator()(unsigned asking, int j) {
+      unsigned rest = find.pairing.accept(askers, asking, j);
+      for (; rest != 0; rest &= rest - 1) {
+        int const a = lowest_bit(rest);
+        if (count[a] < noted_partners) find.partner(first_noted(first + a) + count[a]) = j;
+        ++count[a];
+      }
     }
   };
   /// Of an index that takes single boxes.
   struct One {
     Visitor& visitor;
-    int a;
-    KOKKOS_FUNCTION void operator()(int j) { visitor(a, j); }
+    unsigned bit;
+    KOKKOS_FUNCTION void operator()(int j) { visitor(bit, j); }
   };
   KOKKOS_FUNCTION void operator()(int g) const {
-    Visitor visitor{*this, group * g, {}, {}};
+    Visitor visitor{*this, group * g};
     int const left = by.count - group * g, n = left < group ? left : int(group);
-    for (int a = 0; a < n; ++a) visitor.asker[a] = pairing.asker(by(group * g + a));
+    for (int a = 0; a < n; ++a) take_in(pairing, by(group * g + a), visitor.askers, a);
     if constexpr (group > 1 && GroupIndex<Index>) {
       QueryGroup query{n, {}, {}};
       for (int a = 0; a < n; ++a) {
         int const i = by(group * g + a);
         query.box[a] = by.box(i);
-        query.least[a] = pairing.least(i);
+        query.least[a] = visitor.askers.least[a];
       }
       index.visit_group(query, visitor);
     } else {
       for (int a = 0; a < n; ++a) {
         int const i = by(group * g + a);
-        index.visit(by.box(i), pairing.least(i), One{visitor, a});
+        index.visit(by.box(i), visitor.askers.least[a], One{visitor, 1u << a});
       }
     }
     for (int a = 0; a < n; ++a) count(group * g + a) = visitor.count[a];
@@ -271,10 +304,10 @@ struct FillPairs {
   /// For a box with more partners than were noted.
   struct Visitor {
     FillPairs const& fill;
-    typename Pairing::Asker asker;
     std::int64_t end;
+    typename Pairing::template Group<1> asker = {};
     KOKKOS_FUNCTION void operator()(int j) {
-      if (fill.find.pairing.accept(asker, j)) fill.writer.partner(end++) = j;
+      if (fill.find.pairing.accept(asker, 1u, j) != 0) fill.writer.partner(end++) = j;
     }
   };
   KOKKOS_FUNCTION void operator()(int a) const {
@@ -285,8 +318,9 @@ struct FillPairs {
     } else {
       int const i = find.by(a);
       // The pairs hold the partners alone until these are sorted.
-      find.index.visit(find.by.box(i), find.pairing.least(i),
-                       Visitor{*this, find.pairing.asker(i), first});
+      Visitor visitor{*this, first};
+      take_in(find.pairing, i, visitor.asker, 0);
+      find.index.visit(find.by.box(i), visitor.asker.least[0], visitor);
       sort(first, last);
       for (std::int64_t k = first; k < last; ++k) writer(find.pairing, i, writer.partner(k), k);
     }
@@ -367,7 +401,7 @@ public:
   PairSearch() = default;
   /// `edge_length`: mean length of the surface's edges, m.
   PairSearch(SurfaceViews<Space> const& surface, double edge_length, Params const& params = {})
-      : boxes_(surface),
+      : boxes_(surface, edge_length),
         triangles_(params, surface.triangles(), edge_length),
         edges_(params, surface.edges(), edge_length),
         inquiry_(std::max(surface.vertices(), surface.edges())) {}
@@ -384,7 +418,7 @@ public:
     ask(boxes_.points(), triangles_.index(), kernels::PairPointTriangle<Space>{{surface, held}},
         found.point_triangle);
     ask(boxes_.edges(), edges_.index(),
-        kernels::PairEdgeEdge<Space>{{surface, held}, boxes_.edges().box}, found.edge_edge);
+        kernels::PairEdgeEdge<Space>{{surface, held}, boxes_.edges().rank}, found.edge_edge);
   }
 
   SurfaceViews<Space> const& surface() const { return boxes_.surface(); }

@@ -13,6 +13,7 @@
 
 #include <taut/contact/broad_phase.hpp>
 #include <taut/core/exec/sort.hpp>
+#include <taut/core/math/bits.hpp>
 
 #include <bit>
 
@@ -53,37 +54,30 @@ struct CurvePlaces {
   }
 };
 
-inline constexpr SizeClass no_class = smallest_class - 1;
-
-/// Eight boxes, bound by bound, with the largest size class of what is in each.
+/// Eight boxes, bound by bound, with the highest rank of what is in each.
 struct BoxBundle {
   static constexpr int size = 8;
   float low[3][size], high[3][size];
-  SizeClass largest[size];
+  Rank rank[size];
   int held[size];
 
-  /// Bit b is set if box b overlaps `query` and holds something of the class `least` or above.
-  KOKKOS_FORCEINLINE_FUNCTION unsigned overlapping(SearchBox const& query, SizeClass least) const {
-    int bit[size];
+  /// Bit b is set if box b overlaps `query` and holds something of the rank `least` or above.
+  KOKKOS_FORCEINLINE_FUNCTION unsigned overlapping(SearchBox const& query, Rank least) const {
     int const held_alike = query.held > 0 ? query.held : -2;  // which none is
-    for (int b = 0; b < size; ++b) {
-      int here = static_cast<int>(largest[b] >= least) & static_cast<int>(held[b] != held_alike);
+    return bits_where<size>([&](int b) {
+      bool here = (rank[b] >= least) & (held[b] != held_alike);
       for (int c = 0; c < 3; ++c) {
-        here &= static_cast<int>(low[c][b] <= query.high[c]) &
-                static_cast<int>(query.low[c] <= high[c][b]);
+        here &= (low[c][b] <= query.high[c]) & (query.low[c] <= high[c][b]);
       }
-      bit[b] = here << b;
-    }
-    unsigned bits = 0;
-    for (int b = 0; b < size; ++b) bits |= static_cast<unsigned>(bit[b]);
-    return bits;
+      return here;
+    });
   }
-  KOKKOS_FUNCTION void set(int b, SearchBox const& box, SizeClass largest_in_it) {
+  KOKKOS_FUNCTION void set(int b, SearchBox const& box, Rank highest_in_it) {
     for (int c = 0; c < 3; ++c) {
       low[c][b] = box.low[c];
       high[c][b] = box.high[c];
     }
-    largest[b] = largest_in_it;
+    rank[b] = highest_in_it;
     held[b] = box.held;
   }
   KOKKOS_FUNCTION SearchBox box(int b) const {
@@ -95,9 +89,9 @@ struct BoxBundle {
     for (int b = 0; b < size; ++b) result = join(result, box(b));
     return result;
   }
-  KOKKOS_FUNCTION SizeClass largest_of_all() const {
-    SizeClass result = no_class;
-    for (int b = 0; b < size; ++b) result = Kokkos::max(result, largest[b]);
+  KOKKOS_FUNCTION Rank highest_rank() const {
+    Rank result = no_rank;
+    for (int b = 0; b < size; ++b) result = Kokkos::max(result, rank[b]);
     return result;
   }
 };
@@ -105,15 +99,17 @@ struct BoxBundle {
 /// Bundle g of boxes; what is left of the last one is empty.
 template <class S>
 struct BundleBoxes {
-  Kokkos::View<SearchBox const*, typename S::memory> box;
+  BoxSet<S> boxes;
   Kokkos::View<int const*, typename S::memory> order;
   Kokkos::View<BoxBundle*, typename S::memory> bundle;
-  int count;
   KOKKOS_FUNCTION void operator()(int g) const {
     for (int b = 0; b < BoxBundle::size; ++b) {
       int const k = BoxBundle::size * g + b;
-      SearchBox const here = k < count ? box(order(k)) : empty_box();
-      bundle(g).set(b, here, k < count ? size_class(longest_side(here)) : no_class);
+      if (k < boxes.count) {
+        bundle(g).set(b, boxes.box(order(k)), boxes.rank(order(k)));
+      } else {
+        bundle(g).set(b, empty_box(), no_rank);
+      }
     }
   }
 };
@@ -128,9 +124,9 @@ struct BundleBundles {
       int const k = BoxBundle::size * g + b;
       if (k < count) {
         BoxBundle const& below = bundle(first_below + k);
-        bundle(first + g).set(b, below.all(), below.largest_of_all());
+        bundle(first + g).set(b, below.all(), below.highest_rank());
       } else {
-        bundle(first + g).set(b, empty_box(), no_class);
+        bundle(first + g).set(b, empty_box(), no_rank);
       }
     }
   }
@@ -176,7 +172,7 @@ public:
     Kokkos::View<int const*, typename S::memory> order;
 
     template <class Visitor>
-    KOKKOS_FUNCTION void visit(SearchBox const& query, SizeClass least, Visitor&& visitor) const {
+    KOKKOS_FUNCTION void visit(SearchBox const& query, Rank least, Visitor&& visitor) const {
       visit_bundles(query, least, One<std::remove_reference_t<Visitor>>{*this, visitor});
     }
     /// Goes down with the box around as many of the group as lie together; what this meets is
@@ -185,7 +181,7 @@ public:
     KOKKOS_FUNCTION void visit_group(QueryGroup const& group, Visitor&& visitor) const {
       for (int first = 0, end = 0; first < group.count; first = end) {
         SearchBox around = group.box[first];
-        SizeClass least = group.least[first];
+        Rank least = group.least[first];
         float side = longest_side(around);
         for (end = first + 1; end < group.count; ++end) {
           SearchBox const more = join(around, group.box[end]);
@@ -197,7 +193,7 @@ public:
         }
         kernels::BoxBundle queries;
         for (int a = 0; a < width; ++a) {
-          queries.set(a, first <= a && a < end ? group.box[a] : empty_box(), 0);
+          queries.set(a, first <= a && a < end ? group.box[a] : empty_box(), lowest_rank);
         }
         visit_bundles(around, least,
                       Group<std::remove_reference_t<Visitor>>{*this, queries, visitor});
@@ -215,7 +211,7 @@ public:
       Index const& index;
       Visitor& visitor;
       KOKKOS_FORCEINLINE_FUNCTION void operator()(int g, unsigned bits) const {
-        for (; bits != 0; bits &= bits - 1) visitor(index.partner(g, Kokkos::countr_zero(bits)));
+        for (; bits != 0; bits &= bits - 1) visitor(index.partner(g, lowest_bit(bits)));
       }
     };
     template <class Visitor>
@@ -225,9 +221,9 @@ public:
       Visitor& visitor;
       KOKKOS_FORCEINLINE_FUNCTION void operator()(int g, unsigned bits) const {
         for (; bits != 0; bits &= bits - 1) {
-          int const b = Kokkos::countr_zero(bits), j = index.partner(g, b);
-          unsigned asking = queries.overlapping(index.bundle(g).box(b), 0);
-          for (; asking != 0; asking &= asking - 1) visitor(Kokkos::countr_zero(asking), j);
+          int const b = lowest_bit(bits), j = index.partner(g, b);
+          unsigned const asking = queries.overlapping(index.bundle(g).box(b), lowest_rank);
+          if (asking != 0) visitor(asking, j);
         }
       }
     };
@@ -235,7 +231,7 @@ public:
     /// Calls found(g, bits) for bundles g of boxes of which some overlap. Depth first, with what is
     /// still to be visited of one bundle per level.
     template <class Found>
-    KOKKOS_FUNCTION void visit_bundles(SearchBox const& query, SizeClass least,
+    KOKKOS_FUNCTION void visit_bundles(SearchBox const& query, Rank least,
                                        Found const& found) const {
       int node[kernels::BundleLevels::most];
       unsigned rest[kernels::BundleLevels::most];
@@ -252,7 +248,7 @@ public:
           if (level == top) return;
           ++level;
         }
-        int const next = width * node[level] + Kokkos::countr_zero(rest[level]);
+        int const next = width * node[level] + lowest_bit(rest[level]);
         rest[level] &= rest[level] - 1;
         --level;
         node[level] = next;
@@ -287,8 +283,7 @@ public:
 
 private:
   void fit(BoxSet<S> const& boxes) const {
-    for_each<S>("bvh_boxes", levels_.bundles(0),
-                kernels::BundleBoxes<S>{boxes.box, order_, bundle_, boxes.count});
+    for_each<S>("bvh_boxes", levels_.bundles(0), kernels::BundleBoxes<S>{boxes, order_, bundle_});
     for (int l = 1; l < levels_.count; ++l) {
       for_each<S>("bvh_level", levels_.bundles(l),
                   kernels::BundleBundles<S>{bundle_, levels_.begin[l], levels_.begin[l - 1],

@@ -33,6 +33,24 @@ KOKKOS_INLINE_FUNCTION void gather(int const (&v)[4], Positions const& x, Vec3<d
     for (int c = 0; c < 3; ++c) y[a][c] = double(x(v[a], c));
 }
 
+/// How far the vertices of a pair, or of a pack of them, are spread; m.
+template <class T>
+KOKKOS_INLINE_FUNCTION T pair_size(Vec3<T> const (&y)[4]) {
+  T size(0.0);
+  for (int a = 1; a < 4; ++a) size += norm(y[a] - y[0]);
+  return size;
+}
+
+/// A distance is noted less this share of it.
+inline constexpr double noted_less = 1e-6;
+
+/// What to note of a pair, or of a pack of them, whose distance was computed as `below` to at most
+/// 1e-14 of its size, m: 0 where that may be more than a millionth.
+template <class T>
+KOKKOS_INLINE_FUNCTION T noted_distance(T const& below, T const& size) {
+  return select(below > T(1e-8) * size, T(T(1 - noted_less) * below), T(0.0));
+}
+
 /// How far apart the pairs of a list were where they were found, in m, each a little less than it
 /// was, and by how much their distances may have changed since, at any time of a motion. It tells
 /// that a pair is out of reach for the price of one number.
@@ -40,20 +58,11 @@ template <class S>
 struct FoundDistances {
   Array<float, S> at;  ///< pair_length; empty: nothing is known
   Displacement moved;
-  static constexpr double shade = 1e-6;
 
   KOKKOS_FUNCTION double least(int k) const { return Kokkos::abs(at(k)) - moved.of(at(k)); }
   /// Where at(k) is not 0.
   KOKKOS_FUNCTION double most(int k) const {
-    return Kokkos::abs(at(k)) * (1 + 4 * shade) + moved.of(at(k));
-  }
-
-  /// What to note for a pair at y whose distance was computed as `below` to at most 1e-14 of its
-  /// size: 0 where that may be more than a millionth.
-  KOKKOS_FUNCTION static float shaded(double below, Vec3<double> const (&y)[4]) {
-    double size = 0;
-    for (int a = 1; a < 4; ++a) size += norm(y[a] - y[0]);
-    return below > 1e-8 * size ? static_cast<float>((1 - shade) * below) : 0.f;
+    return Kokkos::abs(at(k)) * (1 + 4 * noted_less) + moved.of(at(k));
   }
 };
 
@@ -268,11 +277,9 @@ struct CloserThan {
 
   KOKKOS_FUNCTION bool operator()(PairKind kind, int const (&)[4],
                                   Vec3<double> const (&y)[4]) const {
-    double size = 0;
-    for (int a = 1; a < 4; ++a) size += norm(y[a] - y[0]);
     // 4 epsilon (|b| + |e1| + |e2|) of closest_features.hpp; the sum is 3 sizes at most.
     constexpr double budget = 16 * Kokkos::Experimental::epsilon_v<Real>;
-    return closest_points(kind, y).distance < radius + budget * size;
+    return closest_points(kind, y).distance < radius + budget * pair_size(y);
   }
 };
 

@@ -72,27 +72,29 @@ struct WithinReach {
   }
 };
 
+/// The distance of a pair, or of a pack of them, m.
 template <class T>
-KOKKOS_FORCEINLINE_FUNCTION Vec3<ValueType<T>> lane_of(Vec3<T> const& y, int i) {
-  return {lane(y[0], i), lane(y[1], i), lane(y[2], i)};
-}
+struct PairDistance {
+  T below;  ///< less the round-off of computing it; infinite where it is known to be too far
+  T noted;  ///< what to note of it
+};
 
-/// The distance of a pair, less the round-off of computing it, or of a pack of them; infinite where
-/// boxes tell that it is not below `farthest`.
+/// Of pairs at y; those are too far that boxes tell not to be closer than `farthest`.
 template <class T>
-KOKKOS_FUNCTION T distance_below(PairKind kind, Vec3<T> const (&y)[4], T const& farthest) {
+KOKKOS_FUNCTION PairDistance<T> distance_below(PairKind kind, Vec3<T> const (&y)[4],
+                                               T const& farthest) {
   T const infinity(Kokkos::Experimental::infinity_v<double>);
   auto const near = !(square_box_gap(kind, y) > T(1 + 1e-12) * farthest * farthest);
   if constexpr (is_pack<T>) {
-    if (!any_lane(near)) return infinity;
+    if (!any_lane(near)) return {infinity, infinity};
   } else {
-    if (!near) return infinity;
+    if (!near) return {infinity, infinity};
   }
-  T size(0.0);
-  for (int a = 1; a < 4; ++a) size += norm(y[a] - y[0]);
+  T const size = pair_size(y);
   // As for CloserThan.
   T const budget(16 * Kokkos::Experimental::epsilon_v<double>);
-  return select(near, T(closest_points(kind, y).distance - budget * size), infinity);
+  T const below = select(near, T(closest_points(kind, y).distance - budget * size), infinity);
+  return {below, noted_distance(below, size)};
 }
 
 /// Chooses those among neighbours, of which what does not change is known.
@@ -107,7 +109,7 @@ struct StillWithinReach {
                                                Vec3<T> const (&y)[4], PairNote (&note)[lanes],
                                                bool (&keep)[lanes]) const {
     bool one_body[lanes];
-    double reach[lanes], watched[lanes], below[lanes], least[lanes];
+    double reach[lanes], watched[lanes], below[lanes], noted[lanes], least[lanes];
     for (int i = 0; i < lanes; ++i) {
       float const d = note[i].distance;
       int const ends[4] = {v[0][i], v[1][i], v[2][i], v[3][i]};
@@ -116,16 +118,13 @@ struct StillWithinReach {
       watched[i] = within.watched(note[i].activation);
     }
     T const farthest = load<T>(watched) + within.moving(load<T>(reach), v, y);
-    T const low = distance_below(kind, y, farthest);
-    store(low, below);
+    PairDistance<T> const distance = distance_below(kind, y, farthest);
+    store(distance.below, below);
+    store(distance.noted, noted);
     store(farthest, least);
     for (int i = 0; i < lanes; ++i) {
-      Vec3<double> const at[4] = {lane_of(y[0], i), lane_of(y[1], i), lane_of(y[2], i),
-                                  lane_of(y[3], i)};
       keep[i] = below[i] < least[i];
-      if (keep[i]) {
-        note[i].distance = pair_length(one_body[i], FoundDistances<S>::shaded(below[i], at));
-      }
+      if (keep[i]) note[i].distance = pair_length(one_body[i], static_cast<float>(noted[i]));
     }
   }
 };
@@ -159,7 +158,7 @@ struct NearAnchors {
                                                bool (&keep)[lanes]) const {
     int const second = kind == PairKind::point_triangle ? 1 : 2;
     bool one_body[lanes];
-    double reach[lanes], far[lanes], below[lanes];
+    double reach[lanes], far[lanes], below[lanes], noted[lanes];
     for (int i = 0; i < lanes; ++i) {
       int const ends[4] = {v[0][i], v[1][i], v[2][i], v[3][i]};
       one_body[i] = within.activation.one_body(ends);
@@ -172,15 +171,15 @@ struct NearAnchors {
     }
     T const whole = within.moving(load<T>(reach), v, y);
     store(whole, far);
-    store(distance_below(kind, y, T(T(within.activation.dhat) + whole)), below);
+    PairDistance<T> const distance = distance_below(kind, y, T(T(within.activation.dhat) + whole));
+    store(distance.below, below);
+    store(distance.noted, noted);
     for (int i = 0; i < lanes; ++i) {
       keep[i] = below[i] < within.activation.dhat + far[i];
       if (!keep[i]) continue;
       int const ends[4] = {v[0][i], v[1][i], v[2][i], v[3][i]};
-      Vec3<double> const at[4] = {lane_of(y[0], i), lane_of(y[1], i), lane_of(y[2], i),
-                                  lane_of(y[3], i)};
       note[i].activation = within.activation(kind, ends);
-      note[i].distance = pair_length(one_body[i], FoundDistances<S>::shaded(below[i], at));
+      note[i].distance = pair_length(one_body[i], static_cast<float>(noted[i]));
       keep[i] = below[i] < within.watched(note[i].activation) + far[i];
     }
   }
@@ -359,37 +358,24 @@ struct ListChosen {
 
 /// Of triangles and the points that they ask for: those that do not ask themselves.
 template <class S>
-struct PairTrianglePoint : PointTrianglePairs<S> {
+struct PairTrianglePoint : PairingBase<3, S> {
   HasStray<S, 1> asks;
 
-  struct Asker {
-    int vertex[3];
-  };
-  KOKKOS_FUNCTION Asker asker(int i) const {
-    auto const& triangle = this->surface.triangle;
-    return {{triangle(3 * i), triangle(3 * i + 1), triangle(3 * i + 2)}};
-  }
-  KOKKOS_FUNCTION void order(int i, int j, int (&ij)[2]) const { ij[0] = j, ij[1] = i; }
-  KOKKOS_FUNCTION bool accept(Asker const& i, int j) const {
-    return asks(j) == 0 &&
-           this->pair({this->surface.vertex(j), i.vertex[0], i.vertex[1], i.vertex[2]});
+  template <int n>
+  KOKKOS_FUNCTION unsigned accept(AskingGroup<3, n> const& group, unsigned bits, int j) const {
+    return asks(j) != 0 ? 0 : this->pairs(group, bits, j);
   }
 };
 
 /// Of edges and all others; of two that ask, the first.
 template <class S>
-struct PairEdgeAnew : EdgePairs<S> {
+struct PairEdgeAnew : PairingBase<2, S> {
   HasStray<S, 2> asks;
 
-  struct Asker {
-    int index, vertex[2];
-  };
-  KOKKOS_FUNCTION Asker asker(int i) const {
-    return {i, {this->surface.edge(2 * i), this->surface.edge(2 * i + 1)}};
-  }
-  KOKKOS_FUNCTION SizeClass least(int) const { return smallest_class; }
-  KOKKOS_FUNCTION bool accept(Asker const& i, int j) const {
-    return (i.index < j || asks(j) == 0) && this->pair(i.vertex, j);
+  template <int n>
+  KOKKOS_FUNCTION unsigned accept(AskingGroup<2, n> const& group, unsigned bits, int j) const {
+    if (asks(j) != 0) bits &= bits_where<n>([&](int b) { return group.index[b] < j; });
+    return bits == 0 ? 0 : this->pairs(group, bits, j);
   }
 };
 

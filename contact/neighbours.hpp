@@ -125,7 +125,7 @@ public:
   /// each other before one of them is searched for again; m.
   Neighbours(SurfaceViews<Space> const& surface, double edge_length, double skin,
              typename Policy::Params const& params)
-      : boxes_(surface),
+      : boxes_(surface, edge_length),
         points_(params, surface.vertices(), edge_length),
         edges_(params, surface.edges(), edge_length),
         triangles_(params, surface.triangles(), edge_length),
@@ -279,7 +279,7 @@ private:
     ask(near, {boxes_.points().box, boxes_.points().count}, triangles_.index(),
         kernels::PairPointTriangle<Space>{{surface(), held}});
     ask(near, {boxes_.edges().box, boxes_.edges().count}, edges_.index(),
-        kernels::PairEdgeEdge<Space>{{surface(), held}, boxes_.edges().box});
+        kernels::PairEdgeEdge<Space>{{surface(), held}, boxes_.edges().rank});
   }
 
   void search_strays(kernels::WithinReach<Precision, Space> const& near) {

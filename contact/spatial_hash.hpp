@@ -22,12 +22,20 @@
 #include <taut/contact/broad_phase.hpp>
 #include <taut/core/exec/copy.hpp>
 #include <taut/core/exec/sort.hpp>
+#include <taut/core/math/bits.hpp>
 
 #include <bit>
 
 namespace taut {
 
 namespace kernels {
+
+/// The class of a box or a length by size: c where the longest side is in [2^c, 2^(c + 1)).
+using SizeClass = int;
+
+KOKKOS_FORCEINLINE_FUNCTION SizeClass size_class(float longest) {
+  return static_cast<int>(Kokkos::bit_cast<std::uint32_t>(longest) >> 23 & 255u) - 127;
+}
 
 /// The grid: cells of level l have the size 2^(first + 1 + l).
 struct HashGrid {
@@ -107,11 +115,11 @@ public:
     int count;
 
     template <class Visitor>
-    KOKKOS_FUNCTION void visit(SearchBox const& query, SizeClass least, Visitor&& visitor) const {
-      unsigned const levels = occupied() & ~0u << grid.level(least);
+    KOKKOS_FUNCTION void visit(SearchBox const& query, Rank, Visitor&& visitor) const {
+      unsigned const levels = occupied();
       double cells = 0;
       for (unsigned rest = levels; rest != 0; rest &= rest - 1) {
-        Range const r = range(query, Kokkos::countr_zero(rest));
+        Range const r = range(query, lowest_bit(rest));
         cells += double(r.high[0] - r.low[0] + 1) * double(r.high[1] - r.low[1] + 1) *
                  double(r.high[2] - r.low[2] + 1);
       }
@@ -122,7 +130,7 @@ public:
         return;
       }
       for (unsigned rest = levels; rest != 0; rest &= rest - 1) {
-        visit_level(query, Kokkos::countr_zero(rest), visitor);
+        visit_level(query, lowest_bit(rest), visitor);
       }
     }
 
@@ -186,7 +194,7 @@ public:
           "spatial hash: {} cells per edge and edges of {} m give no cell size: check the surface",
           params.cell, length);
     }
-    grid_.first = size_class(size);
+    grid_.first = kernels::size_class(size);
     grid_.mask = std::bit_ceil(2 * static_cast<unsigned>(std::max(count, 1))) - 1;
     begin_ = Kokkos::View<int*, typename S::memory>("hash_begin", std::size_t(grid_.mask) + 2);
   }

@@ -4,6 +4,7 @@
 
 #include <taut/core/exec/growing.hpp>
 #include <taut/core/exec/parallel.hpp>
+#include <taut/core/math/bits.hpp>
 #include <taut/mpm/grid_nodes.hpp>
 #include <taut/mpm/topology.hpp>
 
@@ -35,7 +36,7 @@ struct PlaceNodes {
     int node = nodes.begin(l);
     for (int x = 0; x < 8; ++x)
       for (std::uint64_t rest = nodes.mask(l, x); rest != 0; rest &= rest - 1, ++node) {
-        int const bit = Kokkos::countr_zero(rest);
+        int const bit = lowest_bit(rest);
         nodes.ijk(node, 0) = nodes.leaves.origin(l, 0) + x;
         nodes.ijk(node, 1) = nodes.leaves.origin(l, 1) + bit / 8;
         nodes.ijk(node, 2) = nodes.leaves.origin(l, 2) + bit % 8;

@@ -10,6 +10,7 @@
 #pragma once
 
 #include <taut/core/exec/space.hpp>
+#include <taut/core/math/bits.hpp>
 
 #include <cstdint>
 
@@ -69,7 +70,7 @@ struct GridNodes {
   /// The same, of a place in leaf l.
   KOKKOS_FUNCTION int in_leaf(int l, int i, int j, int k) const {
     std::uint64_t const word = mask(l, i & 7), bit = std::uint64_t(1) << (8 * (j & 7) + (k & 7));
-    return (word & bit) == 0 ? -1 : first(l, i & 7) + Kokkos::popcount(word & (bit - 1));
+    return (word & bit) == 0 ? -1 : first(l, i & 7) + count_bits(word & (bit - 1));
   }
   /// The leaf, l or one of its 26 neighbours, that holds a place at most 8 nodes outside l; or -1.
   KOKKOS_FUNCTION int leaf_near(int l, int i, int j, int k) const {

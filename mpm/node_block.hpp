@@ -4,6 +4,7 @@
 // dense window in which what is not active is zero: then every stencil in it is a plain loop.
 #pragma once
 
+#include <taut/core/math/bits.hpp>
 #include <taut/core/math/matrix.hpp>
 #include <taut/mpm/grid_nodes.hpp>
 
@@ -37,10 +38,10 @@ struct NodeBlock {
         int const shift = 8 * ((low[1] & 7) + y) + (low[2] & 7);
         unsigned bits = static_cast<unsigned>(word >> shift) & 0xf;
         if (bits == 0) continue;
-        int next = first + Kokkos::popcount(word & ((std::uint64_t(1) << shift) - 1));
+        int next = first + count_bits(word & ((std::uint64_t(1) << shift) - 1));
         for (; bits != 0; bits &= bits - 1, ++count, ++next) {
           node[count] = next;
-          place[count] = static_cast<unsigned char>(16 * x + 4 * y + Kokkos::countr_zero(bits));
+          place[count] = static_cast<unsigned char>(16 * x + 4 * y + lowest_bit(bits));
         }
       }
     }
@@ -100,7 +101,7 @@ private:
         int const shift = 8 * ((j & 7) + y) + (k & 7);
         unsigned bits = static_cast<unsigned>(word >> shift) & ((1u << length[2]) - 1);
         if (bits == 0) continue;
-        int next = first + Kokkos::popcount(word & ((std::uint64_t(1) << shift) - 1));
+        int next = first + count_bits(word & ((std::uint64_t(1) << shift) - 1));
         for (T* to = at(from[0] + x, from[1] + y, from[2]); bits != 0; bits >>= 1, to += 3) {
           if ((bits & 1) == 0) continue;
           for (int c = 0; c < 3; ++c) to[c] = T(field(next, c));

@@ -230,7 +230,7 @@ TEMPLATE_TEST_CASE("a search that is used again finds what a new one does", "[co
 TEST_CASE("a hierarchy is sorted anew only when its boxes have grown", "[contact]") {
   using S = DefaultSpace;
   Soup soup = make_soup(Kind::scattered, 3, 200);
-  SurfaceBoxes<S> boxes(copy_surface<S>(soup.surface));
+  SurfaceBoxes<S> boxes(copy_surface<S>(soup.surface), soup.edge_length);
   Bvh<S> bvh({}, boxes.edges().count, soup.edge_length);
   auto const build = [&] {
     boxes.compute(motion_of<Fp64, S>(soup, 0), soup.radius);

@@ -194,7 +194,7 @@ TEMPLATE_LIST_TEST_CASE("what was found far enough apart keeps its clearance wit
         Crowd<TestType> const c({m});
         Vec3<double> y[4] = {m.x[0], m.x[1], m.x[2], m.x[3]};
         FoundDistances<S> found{Array<float, S>("found", 1), {}};
-        found.at(0) = FoundDistances<S>::shaded(distance * (1 - 1e-9), y);
+        found.at(0) = static_cast<float>(noted_distance(distance * (1 - 1e-9), pair_size(y)));
         // That of the corners and of storing them.
         double const moved =
             by * (1 + 1e-6) + 8 * double(std::numeric_limits<Position>::epsilon()) * m.size();
