@@ -3,11 +3,11 @@
 //   a = min(dhat, f D),   D the distance of the pair at rest,
 //
 // for pairs of one body, and for pairs of two below dhat, or less where they start closer
-// (start_gaps.hpp). With f < 1 no pair acts at rest, so a
-// body whose mesh is finer than dhat keeps its shape, and still no pair is exempt, as it would be
-// by the exclusion of Shen et al. 2024 (section 4.4: pairs closer than 1.5 dhat at rest are
-// dropped; `RestExclusion`, for comparison). D is computed where it is needed, from the positions
-// at rest: a table of all pairs would be as long as it is useless for most of them.
+// (start_activation.hpp). With f < 1 no pair acts at rest, so a body whose mesh is finer than dhat
+// keeps its shape, and still no pair is exempt, as it would be by the exclusion of Shen et al. 2024
+// (section 4.4: pairs closer than 1.5 dhat at rest are dropped; `RestExclusion`, for comparison). D
+// is computed where it is needed, from the positions at rest: a table of all pairs would be as long
+// as it is useless for most of them.
 #pragma once
 
 #include <taut/contact/candidates.hpp>

@@ -63,7 +63,7 @@ public:
     std::optional<double> dhat = {};  ///< m; else default_dhat (surface.hpp)
     double cap = 0.5;  ///< of the distance at rest, for pairs of one body (activation.hpp)
     /// Of the gap that two bodies start with, below which they act; 0: below dhat, however close
-    /// they start (start_gaps.hpp).
+    /// they start (start_activation.hpp).
     double start_share = 0.9;
     Stiffness_ stiffness = {};
     double mollifier_threshold = EdgeMollifier::default_threshold;
@@ -282,11 +282,11 @@ private:
       surface = copy_surface<Space>(host);
       portion = edges.mean;
       size = box_diagonal(host, rest);
-      activation = {params.dhat.value_or(default_dhat(host, rest)), params.cap,
-                    copy_points<Space>("contact_rest", rest), surface.object,
-                    Array<double, Space>("contact_activation_of_vertex", rest.size())};
-      assign(activation.of_vertex, activation.dhat);
-      start_gaps = {surface, activation, params.start_share, edges.mean, params.search.search};
+      double const dhat = params.dhat.value_or(default_dhat(host, rest));
+      StartActivation<Space> const start("contact", rest.size(), dhat, params.start_share);
+      activation = {dhat, params.cap, copy_points<Space>("contact_rest", rest), surface.object,
+                    start.of_vertex()};
+      start_gaps = {surface, activation, start, edges.mean, params.search.search};
       clearance.ample = std::min(clearance.ample, activation.dhat);
       near = Cache(surface, edges.mean, activation, params.search);
       brief = std::max(portion, 2 * params.search.slack * activation.dhat);

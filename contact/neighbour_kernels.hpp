@@ -74,14 +74,14 @@ struct WithinReach {
 
 /// The distance of a pair, or of a pack of them, m.
 template <class T>
-struct PairDistance {
+struct NearDistance {
   T below;  ///< less the round-off of computing it; infinite where it is known to be too far
   T noted;  ///< what to note of it
 };
 
 /// Of pairs at y; those are too far that boxes tell not to be closer than `farthest`.
 template <class T>
-KOKKOS_FUNCTION PairDistance<T> distance_below(PairKind kind, Vec3<T> const (&y)[4],
+KOKKOS_FUNCTION NearDistance<T> distance_below(PairKind kind, Vec3<T> const (&y)[4],
                                                T const& farthest) {
   T const infinity(Kokkos::Experimental::infinity_v<double>);
   auto const near = !(square_box_gap(kind, y) > T(1 + 1e-12) * farthest * farthest);
@@ -118,7 +118,7 @@ struct StillWithinReach {
       watched[i] = within.watched(note[i].activation);
     }
     T const farthest = load<T>(watched) + within.moving(load<T>(reach), v, y);
-    PairDistance<T> const distance = distance_below(kind, y, farthest);
+    NearDistance<T> const distance = distance_below(kind, y, farthest);
     store(distance.below, below);
     store(distance.noted, noted);
     store(farthest, least);
@@ -171,7 +171,7 @@ struct NearAnchors {
     }
     T const whole = within.moving(load<T>(reach), v, y);
     store(whole, far);
-    PairDistance<T> const distance = distance_below(kind, y, T(T(within.activation.dhat) + whole));
+    NearDistance<T> const distance = distance_below(kind, y, T(T(within.activation.dhat) + whole));
     store(distance.below, below);
     store(distance.noted, noted);
     for (int i = 0; i < lanes; ++i) {

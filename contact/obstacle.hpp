@@ -17,7 +17,7 @@
 #include <taut/contact/adaptive_stiffness.hpp>
 #include <taut/contact/lag_obstacle.hpp>
 #include <taut/contact/obstacle_kernels.hpp>
-#include <taut/contact/start_gaps.hpp>
+#include <taut/contact/start_activation.hpp>
 #include <taut/core/exec/copy.hpp>
 
 #include <algorithm>
@@ -190,7 +190,9 @@ public:
   void begin_step(StepStart<Precision, Space> const& start) const {
     state_->take_stiffness(start.stiffness);
     state_->enter(start.x);
-    state_->look_at_gaps(start.x);
+    if (state_->start.is_short()) {
+      state_->start.raise(kernels::FaceGap<Table>{state_->table, start.x});
+    }
     FaceMotion const& motion = state_->track.motion();
     state_->carry = {turn_matrix(motion.turn), motion.along};
     state_->begun = state_->track.pose().rotation;
@@ -241,9 +243,7 @@ public:
   double dhat() const { return state_->table.fields.dhat; }
   /// For checkpoints: below what each vertex of the surface is acted on, m.
   Array<double, Space> activation() const { return state_->table.activation; }
-  void set_activation(Array<double, Space> const& of_vertex) const {
-    state_->set_activation(of_vertex);
-  }
+  void set_activation(Array<double, Space> const& of_vertex) const { state_->start.set(of_vertex); }
   ObstacleReport report(Positions const& x) const {
     using Forces = kernels::SumObstacleForces<Barrier, Table>;
     auto const total = sum<4>("obstacle_forces", Forces{table(), x});
@@ -270,10 +270,8 @@ private:
     ObstacleCarry carry;                           ///< in the step that has begun
     Mat3<double> begun = identity3<double>();      ///< how it was turned then
     typename SurfaceViews<Space>::Indices object;  ///< per vertex of the mesh
-    bool anew = true;  ///< nothing is known yet of what the obstacle holds
-    double start_share;
-    bool starts_short = start_share > 0;  ///< some vertex may be acted on from below dhat only
-    bool first = true;                    ///< no step has begun
+    bool anew = true;              ///< nothing is known yet of what the obstacle holds
+    StartActivation<Space> start;  ///< per vertex of the surface
     std::optional<LimitingVertex> limiting;
     double size;  ///< the diagonal of the box around the surface at rest, m
     Reducer<Space, double> reducer;
@@ -281,10 +279,7 @@ private:
     State(Unknowns<Precision, Space> const& unknowns, Surface const& host,
           std::vector<Point> const& rest, Shape const& given, Params const& params,
           RigidPose const& pose)
-        : shape(given),
-          clearance(params.clearance),
-          track(given.centre()),
-          start_share(params.start_share) {
+        : shape(given), clearance(params.clearance), track(given.centre()) {
       if (rest.size() != host.object.size() || rest.size() != std::size_t(unknowns.size())) {
         throw Error(
             "obstacle: {} positions at rest, a surface over {} vertices and {} unknowns: give as "
@@ -302,8 +297,8 @@ private:
       table.vertex = to_space<Space>("obstacle_vertex", host.vertices);
       object = to_space<Space>("obstacle_object", host.object);
       table.held = Fixed("obstacle_held", host.vertices.size());
-      table.activation = Array<double, Space>("obstacle_activation", host.vertices.size());
-      assign(table.activation, dhat);
+      start = {"obstacle", host.vertices.size(), dhat, params.start_share};
+      table.activation = start.of_vertex();
       table.rule = params.stiffness;
       table.fields = {area_of(host, rest), {}, unknowns.fixed, dhat};
       reducer = Reducer<Space, double>(vertices(), 4);
@@ -316,12 +311,6 @@ private:
       if (!params.stiffness.valid()) {
         throw Error("obstacle: the stiffness rule '{}' needs a positive stiffness (stiffness.hpp)",
                     Stiffness_::name);
-      }
-      if (!(params.start_share >= 0 && params.start_share < 1)) {
-        throw Error(
-            "obstacle: a face that acts below {} of the gap a vertex starts with: give a share "
-            "from 0 on and below 1",
-            params.start_share);
       }
       kernels::check_clearance(params.clearance, 1);
       shape.check();
@@ -379,20 +368,6 @@ private:
                               {Kokkos::Experimental::infinity_v<double>}, table, x, anew});
       if (!(worst.alpha > 0)) refuse(vertex_of(worst), x);
       anew = false;
-    }
-    /// What starts closer than dhat is acted on from closer (start_gaps.hpp).
-    void look_at_gaps(Positions const& x) {
-      if (!starts_short) return;
-      kernels::RaiseActivation<kernels::FaceGap<Table>, Space> const raise{
-          {table, x}, table.activation, table.fields.dhat, start_share, first};
-      starts_short = maximum<Space>("obstacle_start_gaps", vertices(), 0, raise) > 0;
-      first = false;
-    }
-    void set_activation(Array<double, Space> const& of_vertex) {
-      if (start_share == 0) return;
-      assign(table.activation, of_vertex);
-      first = false;
-      starts_short = true;  // the next step finds out
     }
     [[noreturn]] void refuse(LimitingVertex const& at, Positions const& x) const {
       auto const host = Kokkos::create_mirror_view_and_copy(Kokkos::HostSpace(), x);
