@@ -130,12 +130,7 @@ public:
     state_.last_step = checkpoint.number<double>("last_step");
     state_.steps = checkpoint.number<std::int32_t>("steps");
     for (auto const& [name, field] : fields()) {
-      auto const& numbers = checkpoint.get<Position>(name);
-      if (numbers.size() != 3 * std::size_t(size())) {
-        throw Error(
-            "the checkpoint holds {} numbers as {}, the scene needs {}; start the run again",
-            numbers.size(), name, 3 * size());
-      }
+      auto const& numbers = numbers_of<Position>(checkpoint, name, 3 * std::size_t(size()));
       auto const host = Kokkos::create_mirror_view(field);
       for (int i = 0; i < size(); ++i)
         for (int c = 0; c < 3; ++c) host(i, c) = numbers[3 * i + c];
@@ -162,10 +157,7 @@ public:
     }
     std::vector<RigidMap> read_poses = poses();
     if (read_poses.empty()) return;
-    auto const& numbers = checkpoint.get<double>("obstacle_poses");
-    if (numbers.size() != 12 * read_poses.size()) {
-      throw Error("the checkpoint holds other obstacles than the scene; start the run again");
-    }
+    auto const& numbers = numbers_of<double>(checkpoint, "obstacle_poses", 12 * read_poses.size());
     auto next = numbers.begin();
     for (RigidMap& pose : read_poses) {
       for (Point& row : pose.rotation)
@@ -187,12 +179,16 @@ private:
   /// One that is as long as `like`.
   static Lengths restored_field(Checkpoint const& checkpoint, std::string const& name,
                                 Lengths const& like) {
-    auto const& numbers = checkpoint.get<double>(name);
-    if (numbers.size() != like.extent(0)) {
-      throw Error("the checkpoint holds {} numbers as {}, the scene needs {}; start the run again",
-                  numbers.size(), name, like.extent(0));
-    }
-    return to_space<DefaultSpace>("restored", numbers);
+    return to_space<DefaultSpace>("restored", numbers_of<double>(checkpoint, name, like.extent(0)));
+  }
+  /// Throws Error unless there are `count`.
+  template <class T>
+  static std::vector<T> const& numbers_of(Checkpoint const& checkpoint, std::string const& name,
+                                          std::size_t count) {
+    std::vector<T> const& numbers = checkpoint.get<T>(name);
+    if (numbers.size() == count) return numbers;
+    throw Error("the checkpoint holds {} numbers as {}, the scene needs {}; start the run again",
+                numbers.size(), name, count);
   }
 
   /// Of bodies and of the surfaces of obstacles.
