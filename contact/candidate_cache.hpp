@@ -118,7 +118,7 @@ public:
   using Space = typename Policy::Space;
   using Positions = VectorField<typename Precision::position, Space>;
   struct Params {
-    double slack = 0.04;  ///< of dhat
+    double slack = 0.02;  ///< of dhat
     double skin = 0.5;    ///< of dhat: how far the neighbours that candidates are chosen from reach
     typename Policy::Params search = {};
   };
