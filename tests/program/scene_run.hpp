@@ -9,6 +9,8 @@
 
 #include <support/data.hpp>
 
+#include <catch2/catch_test_macros.hpp>
+
 #include <sstream>
 #include <vector>
 
@@ -36,5 +38,23 @@ struct SceneRun {
     return lines;
   }
 };
+
+/// Runs both, the second one in two legs (its overrides end the first), and checks that they leave
+/// the same, bit for bit.
+inline void check_goes_on(SceneRun& whole, SceneRun& legs) {
+  REQUIRE(run_command(whole.options) == 0);
+  REQUIRE(run_command(legs.options) == 0);
+  REQUIRE(legs.result().frames() < whole.result().frames());
+  legs.options.restart = true;
+  legs.options.scene.changes.overrides = {};
+  REQUIRE(run_command(legs.options) == 0);
+  ResultReader const one = whole.result(), other = legs.result();
+  REQUIRE(one.frames() == other.frames());
+  for (std::int64_t frame = 0; frame < one.frames(); ++frame) {
+    INFO("frame " << frame);
+    CHECK(one.positions(frame) == other.positions(frame));
+    CHECK(one.velocities(frame) == other.velocities(frame));
+  }
+}
 
 }  // namespace taut::test

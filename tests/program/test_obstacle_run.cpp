@@ -109,18 +109,8 @@ TEST_CASE("obstacles are in the result where their motion has brought them", "[o
 }
 
 TEST_CASE("a run with obstacles goes on bitwise after a restart", "[obstacle]") {
-  LiftRun whole, parts({"time.frames=3"});
-  CHECK(run_command(whole.options) == 0);
-  CHECK(run_command(parts.options) == 0);
-  parts.options.restart = true;
-  parts.options.scene.changes.overrides = {};
-  CHECK(run_command(parts.options) == 0);
-  ResultReader const one = whole.result(), other = parts.result();
-  REQUIRE(one.frames() == other.frames());
-  for (std::int64_t frame = 0; frame < one.frames(); ++frame) {
-    CHECK(one.positions(frame) == other.positions(frame));
-    CHECK(one.velocities(frame) == other.velocities(frame));
-  }
+  LiftRun whole, legs({"time.frames=3"});
+  check_goes_on(whole, legs);
 }
 
 TEST_CASE("a body that starts beyond a half space is refused, naming both", "[obstacle]") {
@@ -187,14 +177,6 @@ TEST_CASE("what is put down closer than dhat stays there", "[obstacle]") {
 }
 
 TEST_CASE("what was put down goes on bitwise after a restart", "[obstacle]") {
-  SceneRun whole("scene.toml", put_down), parts("scene.toml", put_down, {"time.frames=15"});
-  CHECK(run_command(whole.options) == 0);
-  CHECK(run_command(parts.options) == 0);
-  parts.options.restart = true;
-  parts.options.scene.changes.overrides = {};
-  CHECK(run_command(parts.options) == 0);
-  ResultReader const one = whole.result(), other = parts.result();
-  REQUIRE(one.frames() == other.frames());
-  CHECK(one.positions(one.frames() - 1) == other.positions(one.frames() - 1));
-  CHECK(one.velocities(one.frames() - 1) == other.velocities(one.frames() - 1));
+  SceneRun whole("scene.toml", put_down), legs("scene.toml", put_down, {"time.frames=15"});
+  check_goes_on(whole, legs);
 }
