@@ -81,11 +81,12 @@ struct BalanceOfGradients {
 
 }  // namespace kernels
 
-/// The balance of a term with barrier B whose rule has been reset, where a step begins: its own
+/// The balance of a term with this barrier whose rule has been reset, where a step begins: its own
 /// gradient against that of all terms that are not told. `size`: l, m.
 template <Barrier B, class Term, class Precision, class S>
-StiffnessBalance balance_of(Term const& term, StepStart<Precision, S> const& start,
-                            FixedMask<S> const& fixed, double size) {
+StiffnessBalance balance_of(B const& barrier, Term const& term,
+                            StepStart<Precision, S> const& start, FixedMask<S> const& fixed,
+                            double size) {
   int const n = static_cast<int>(start.x.extent(0));
   VectorField<typename Precision::real, S> const g("adaptive_gradient", n);
   term.add_gradient(start.x, 1, fixed, g);
@@ -99,7 +100,7 @@ StiffnessBalance balance_of(Term const& term, StepStart<Precision, S> const& sta
           term.report(start.x).smallest_gap * dhat,
           start.mean_mass / (start.time_step * start.time_step),
           size,
-          evaluate_barrier<B>(distance, dhat).curvature};
+          evaluate_barrier(barrier, distance, dhat).curvature};
 }
 
 }  // namespace taut

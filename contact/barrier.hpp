@@ -34,15 +34,16 @@ struct RelativeStep {
 };
 
 /// The shape of a barrier: g and its derivatives in x, and g(after) - g(before) without
-/// cancellation.
+/// cancellation. Most have no state, and these functions are static.
 template <class B>
-concept Barrier = requires(RelativeDistance<double> const& s, RelativeStep<double> const& step) {
+concept Barrier = requires(B const& b, RelativeDistance<double> const& s,
+                           RelativeStep<double> const& step) {
   { B::name } -> std::convertible_to<char const*>;
   { B::curvature_at_half } -> std::convertible_to<double>;  // g''(1/2)
-  { B::value(s) } -> std::same_as<double>;
-  { B::slope(s) } -> std::same_as<double>;
-  { B::curvature(s) } -> std::same_as<double>;
-  { B::change(s, s, step) } -> std::same_as<double>;  // before, after, step
+  { b.value(s) } -> std::same_as<double>;
+  { b.slope(s) } -> std::same_as<double>;
+  { b.curvature(s) } -> std::same_as<double>;
+  { b.change(s, s, step) } -> std::same_as<double>;  // before, after, step
 };
 
 namespace kernels {
@@ -233,40 +234,49 @@ KOKKOS_FORCEINLINE_FUNCTION RelativeDistance<T> relative_distance(T d, T activat
 /// At distance d >= 0, m. Zero from the activation distance on; at d = 0 the logarithms are
 /// infinite, and their derivatives infinite or not a number.
 template <Barrier B, class T>
-KOKKOS_INLINE_FUNCTION BarrierValues<T> evaluate_barrier(T d, T activation) {
+KOKKOS_INLINE_FUNCTION BarrierValues<T> evaluate_barrier(B const& barrier, T d, T activation) {
   if constexpr (!is_pack<T>) {
     if (!(d < activation)) return {T(0), T(0), T(0)};
   }
   auto const s = kernels::relative_distance(d, activation);
-  BarrierValues<T> r{square(activation) * B::value(s), activation * B::slope(s), B::curvature(s)};
+  BarrierValues<T> r{square(activation) * barrier.value(s), activation * barrier.slope(s),
+                     barrier.curvature(s)};
   if constexpr (is_pack<T>) {
     for (T* value : {&r.value, &r.slope, &r.curvature})
       *value = select(d < activation, *value, T(0));
   }
   return r;
 }
+template <Barrier B, class T>
+KOKKOS_INLINE_FUNCTION BarrierValues<T> evaluate_barrier(T d, T activation) {
+  return evaluate_barrier(B(), d, activation);
+}
 
 /// b(after) - b(before) with an error relative to itself. `step` is after - before, which the
 /// caller knows better than the rounded distances do.
 template <Barrier B, class T>
-KOKKOS_INLINE_FUNCTION T barrier_change(T before, T after, T step, T activation) {
+KOKKOS_INLINE_FUNCTION T barrier_change(B const& barrier, T before, T after, T step, T activation) {
   if constexpr (!is_pack<T>) {
-    if (!(before < activation)) return evaluate_barrier<B>(after, activation).value;
-    if (!(after < activation)) return -evaluate_barrier<B>(before, activation).value;
+    if (!(before < activation)) return evaluate_barrier(barrier, after, activation).value;
+    if (!(after < activation)) return -evaluate_barrier(barrier, before, activation).value;
   }
   auto const from = kernels::relative_distance(before, activation);
   auto const to = kernels::relative_distance(after, activation);
   auto const opens = step > T(0);
   T const log_ratio = log1p(select(opens, T(step / before), T(-step / after)));
-  T const change = B::change(
+  T const change = barrier.change(
       from, to, RelativeStep<T>{step / activation, select(opens, log_ratio, T(-log_ratio))});
   if constexpr (is_pack<T>) {
-    T const gained = select(after < activation, B::value(to), T(0));
-    T const lost = select(after < activation, change, T(-B::value(from)));
+    T const gained = select(after < activation, barrier.value(to), T(0));
+    T const lost = select(after < activation, change, T(-barrier.value(from)));
     return square(activation) * select(before < activation, lost, gained);
   } else {
     return square(activation) * change;
   }
+}
+template <Barrier B, class T>
+KOKKOS_INLINE_FUNCTION T barrier_change(T before, T after, T step, T activation) {
+  return barrier_change(B(), before, after, step, activation);
 }
 
 }  // namespace taut

@@ -173,7 +173,7 @@ public:
       if (!table.rule().adapts()) return;
       table.change_rule([](Stiffness_& rule) { rule.reset(); });
       StiffnessBalance const balance =
-          balance_of<typename Pair::Barrier>(*this, start, state_->fixed, state_->size);
+          balance_of(typename Pair::Barrier(), *this, start, state_->fixed, state_->size);
       table.change_rule([&](Stiffness_& rule) { rule.adapt(balance); });
     }
   }

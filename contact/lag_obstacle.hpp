@@ -25,7 +25,7 @@ struct ObstacleCarry {
 namespace kernels {
 
 /// Item i most + f: face f and surface vertex i.
-template <class Barrier, class Table, class Precision, class S>
+template <class Table, class Precision, class S>
 struct LagFace {
   using Real = typename Precision::real;
   Table table;
@@ -43,7 +43,7 @@ struct LagFace {
     FaceDistance const at = distance_to(table.faces.face[f], table.from_centre(i, x));
     if (!(at.distance > 0 && at.distance < activation)) return false;
     double const press =
-        -table.stiffness(i) * obstacle_barrier<Barrier>(at.distance, activation).slope;
+        -table.stiffness(i) * obstacle_barrier(table.barrier, at.distance, activation).slope;
     Vec3<double> const motion = carry({double(x(v, 0)), double(x(v, 1)), double(x(v, 2))});
     to.vertex[0] = v;
     to.c[0] = Real(1);

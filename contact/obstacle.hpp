@@ -90,6 +90,7 @@ public:
   struct Params {
     std::optional<double> dhat = {};  ///< m; else default_dhat (surface.hpp)
     double start_share = 0.9;         ///< as in Contact
+    Barrier_ barrier = {};
     Stiffness_ stiffness = {};
     Clearance clearance = {.share = 0.45};  ///< as in Contact
   };
@@ -103,28 +104,28 @@ public:
       : state_(std::make_shared<State>(unknowns, surface, rest, shape, params, pose)) {}
 
   double value(Positions const& x, double scale) const {
-    using Kernel = kernels::ObstacleValue<Barrier, Table>;
+    using Kernel = kernels::ObstacleValue<Table>;
     return scale * sum<1>("obstacle_value", Kernel{table(), x})[0];
   }
   double change(Positions const& x, Vectors const& p, double alpha, double scale) const {
-    using Kernel = kernels::ObstacleChange<Barrier, Table>;
+    using Kernel = kernels::ObstacleChange<Table>;
     return scale * sum<1>("obstacle_change", Kernel{table(), x, p, alpha, false})[0];
   }
   double quadratic_form(Positions const& x, Vectors const& p, double scale) const {
-    using Kernel = kernels::ObstacleForm<Barrier, Table>;
+    using Kernel = kernels::ObstacleForm<Table>;
     return scale * sum<1>("obstacle_form", Kernel{table(), x, p})[0];
   }
 
   void add_form_shares(Positions const& x, Vectors const& p, double scale, Fixed const&,
                        Array<double, Space> const& shares) const {
-    using Form = kernels::ObstacleForm<Barrier, Table>;
+    using Form = kernels::ObstacleForm<Table>;
     for_each<Space>("obstacle_shares", vertices(),
                     kernels::ObstacleShares<Form, Space>{Form{table(), x, p}, scale, shares});
   }
 
   void mark_acting(Positions const& x, Fixed const&, Array<int, Space> const& marks) const {
     for_each<Space>("obstacle_marks", vertices(),
-                    kernels::MarkTouched<Barrier, Table, Space>{table(), x, marks});
+                    kernels::MarkTouched<Table, Space>{table(), x, marks});
   }
 
   void add_gradient(Positions const& x, double scale, Fixed const&, Vectors const& g) const {
@@ -153,11 +154,11 @@ public:
 
   void add_product(Positions const& x, Vectors const& p, double scale, Fixed const&,
                    Vectors const& hp) const {
-    using Kernel = kernels::ObstacleProduct<Barrier, Table>;
+    using Kernel = kernels::ObstacleProduct<Table>;
     for_each<Space>("obstacle_product", vertices(), Kernel{table(), x, p, scale, hp});
   }
   void add_to(Matrix const& matrix, Positions const& x, double scale, Fixed const&) const {
-    using Kernel = kernels::ObstacleAssemble<Barrier, Table, Space>;
+    using Kernel = kernels::ObstacleAssemble<Table, Space>;
     for_each<Space>("obstacle_assemble", vertices(), Kernel{table(), x, scale, matrix});
   }
   /// An obstacle couples no unknowns.
@@ -200,14 +201,15 @@ public:
       Stiffness_& rule = state_->table.rule;
       if (!rule.adapts()) return;
       rule.reset();
-      rule.adapt(balance_of<Barrier>(*this, start, state_->table.fields.fixed, state_->size));
+      rule.adapt(balance_of(state_->table.barrier, *this, start, state_->table.fields.fixed,
+                            state_->size));
     }
   }
 
   /// For friction: appends what acts at x; the coefficient of object k of the surface is mu(k, k).
   void lag(Positions const& x, kernels::FrictionMatrix<Space> const& mu,
            LaggedContacts<Precision, Space>& to) const {
-    using Kernel = kernels::LagFace<Barrier, Table, Precision, Space>;
+    using Kernel = kernels::LagFace<Table, Precision, Space>;
     // Within the step, what is at x now was elsewhere on the way that it goes.
     state_->carry.centre = state_->table.faces.origin;
     state_->carry.back = state_->begun * transpose(state_->track.pose().rotation);
@@ -245,7 +247,7 @@ public:
   Array<double, Space> activation() const { return state_->table.activation; }
   void set_activation(Array<double, Space> const& of_vertex) const { state_->start.set(of_vertex); }
   ObstacleReport report(Positions const& x) const {
-    using Forces = kernels::SumObstacleForces<Barrier, Table>;
+    using Forces = kernels::SumObstacleForces<Table>;
     auto const total = sum<4>("obstacle_forces", Forces{table(), x});
     using Gap = kernels::LeastObstacleGap<Table>;
     double const gap = minimum<Space>("obstacle_gap", vertices(), 1.0, Gap{{table(), x}});
@@ -260,7 +262,7 @@ public:
   }
 
 private:
-  using Table = kernels::ObstacleTable<Shape::max_faces, Stiffness_, Precision, Space>;
+  using Table = kernels::ObstacleTable<Shape::max_faces, Barrier, Stiffness_, Precision, Space>;
 
   struct State {
     Shape shape;
@@ -299,6 +301,7 @@ private:
       table.held = Fixed("obstacle_held", host.vertices.size());
       start = {"obstacle", host.vertices.size(), dhat, params.start_share};
       table.activation = start.of_vertex();
+      table.barrier = params.barrier;
       table.rule = params.stiffness;
       table.fields = {area_of(host, rest), {}, unknowns.fixed, dhat};
       reducer = Reducer<Space, double>(vertices(), 4);
@@ -428,7 +431,7 @@ private:
   }
 
   template <int numbers, class CurvatureField>
-  using Gradient = kernels::ObstacleGradient<Barrier, Table, numbers, CurvatureField>;
+  using Gradient = kernels::ObstacleGradient<Table, numbers, CurvatureField>;
 
   template <int numbers, class CurvatureField>
   void gradient(Positions const& x, double scale, Vectors const& g, CurvatureField const& c) const {
@@ -438,7 +441,7 @@ private:
   template <int numbers, class CurvatureField>
   double gradient_after(Positions const& x, Vectors const& p, double alpha, double scale,
                         Vectors const& g, CurvatureField const& c) const {
-    using Kernel = kernels::ObstacleGradientAfter<Barrier, Table, numbers, CurvatureField>;
+    using Kernel = kernels::ObstacleGradientAfter<Table, numbers, CurvatureField>;
     return scale * sum<1>("obstacle_gradient_after",
                           Kernel{{table(), x, scale, g, c}, {table(), x, p, alpha, true}})[0];
   }

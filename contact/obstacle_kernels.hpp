@@ -24,7 +24,7 @@
 namespace taut::kernels {
 
 /// What all sweeps read.
-template <int n, class Rule, class Precision, class S>
+template <int n, class Barrier, class Rule, class Precision, class S>
 struct ObstacleTable {
   using Position = typename Precision::position;
   using Real = typename Precision::real;
@@ -34,6 +34,7 @@ struct ObstacleTable {
   typename SurfaceViews<S>::Indices vertex;
   FixedMask<S> held;            ///< per surface vertex: 1 for what is fixed within the obstacle
   Array<double, S> activation;  ///< per surface vertex: the distance below which a face acts, m
+  Barrier barrier;
   Rule rule;
   StiffnessFields<Precision, S> fields;
   PlacedFaces<n> faces;
@@ -63,22 +64,24 @@ struct ObstacleTable {
 
 /// Energies are infinite from the face on, whatever the barrier.
 template <class Barrier>
-KOKKOS_INLINE_FUNCTION BarrierValues<double> obstacle_barrier(double distance, double activation) {
+KOKKOS_INLINE_FUNCTION BarrierValues<double> obstacle_barrier(Barrier const& barrier,
+                                                              double distance, double activation) {
   constexpr double infinity = Kokkos::Experimental::infinity_v<double>;
   if (!(distance > 0)) return {infinity, -infinity, infinity};
-  return evaluate_barrier<Barrier>(distance, activation);
+  return evaluate_barrier(barrier, distance, activation);
 }
 
 /// E(w + s) - E(w) of one face, over K, without cancellation: distances change by n . s, or by
 /// (|w|^2 - |w + s|^2) / (|w| + |w + s|).
 template <class Barrier>
-KOKKOS_INLINE_FUNCTION double obstacle_change(ObstacleFace const& face, Vec3<double> const& w,
-                                              Vec3<double> const& s, double activation) {
+KOKKOS_INLINE_FUNCTION double obstacle_change(Barrier const& barrier, ObstacleFace const& face,
+                                              Vec3<double> const& w, Vec3<double> const& s,
+                                              double activation) {
   FaceDistance const before = distance_to(face, w), after = distance_to(face, w + s);
   if (!(before.distance < activation) && !(after.distance < activation)) return 0;
   if (!(before.distance > 0) || !(after.distance > 0)) {
-    return obstacle_barrier<Barrier>(after.distance, activation).value -
-           obstacle_barrier<Barrier>(before.distance, activation).value;
+    return obstacle_barrier(barrier, after.distance, activation).value -
+           obstacle_barrier(barrier, before.distance, activation).value;
   }
   double step;
   if (face.kind == FaceKind::plane) {
@@ -91,7 +94,7 @@ KOKKOS_INLINE_FUNCTION double obstacle_change(ObstacleFace const& face, Vec3<dou
         round ? dot(cross(face.direction, s), cross(face.direction, twice)) : dot(s, twice);
     step = both > 0 ? -product / both : 0;
   }
-  return barrier_change<Barrier>(before.distance, after.distance, step, activation);
+  return barrier_change(barrier, before.distance, after.distance, step, activation);
 }
 
 /// The Hessian of a face in contact at w, over K.
@@ -120,7 +123,7 @@ struct ObstacleForce {
   Sym3<double> hessian{{0, 0, 0, 0, 0, 0}};
   int contacts = 0;
 };
-template <class Barrier, class Table>
+template <class Table>
 KOKKOS_INLINE_FUNCTION ObstacleForce obstacle_force(Table const& table, int i,
                                                     typename Table::Positions const& x,
                                                     bool with_hessian) {
@@ -130,7 +133,7 @@ KOKKOS_INLINE_FUNCTION ObstacleForce obstacle_force(Table const& table, int i,
   for (int f = 0; f < table.faces.count; ++f) {
     FaceDistance const at = distance_to(table.faces.face[f], w);
     if (!(at.distance < activation)) continue;
-    auto const b = obstacle_barrier<Barrier>(at.distance, activation);
+    auto const b = obstacle_barrier(table.barrier, at.distance, activation);
     r.gradient = r.gradient + b.slope * at.n;
     ++r.contacts;
     if (!with_hessian) continue;
@@ -144,7 +147,7 @@ KOKKOS_INLINE_FUNCTION ObstacleForce obstacle_force(Table const& table, int i,
   return r;
 }
 
-template <class Barrier, class Table>
+template <class Table>
 struct ObstacleValue {
   Table table;
   typename Table::Positions x;
@@ -155,7 +158,7 @@ struct ObstacleValue {
     double sum = 0;
     for (int f = 0; f < table.faces.count; ++f) {
       double const d = distance_to(table.faces.face[f], w).distance;
-      if (d < activation) sum += obstacle_barrier<Barrier>(d, activation).value;
+      if (d < activation) sum += obstacle_barrier(table.barrier, d, activation).value;
     }
     return sum == 0 ? 0 : table.stiffness(i) * sum;
   }
@@ -163,7 +166,7 @@ struct ObstacleValue {
 };
 
 /// By the step alpha p that starts at x; that has led to x if `arrived`.
-template <class Barrier, class Table>
+template <class Table>
 struct ObstacleChange {
   Table table;
   typename Table::Positions x;
@@ -176,7 +179,7 @@ struct ObstacleChange {
     Vec3<double> const w = arrived ? table.from_centre(i, x) - s : table.from_centre(i, x);
     double sum = 0;
     for (int f = 0; f < table.faces.count; ++f) {
-      sum += obstacle_change<Barrier>(table.faces.face[f], w, s, table.activation(i));
+      sum += obstacle_change(table.barrier, table.faces.face[f], w, s, table.activation(i));
     }
     return sum == 0 ? 0 : table.stiffness(i) * sum;
   }
@@ -184,7 +187,7 @@ struct ObstacleChange {
 };
 
 /// Adds gradient and `numbers` of curvature.
-template <class Barrier, class Table, int numbers, class CurvatureField>
+template <class Table, int numbers, class CurvatureField>
 struct ObstacleGradient {
   using Real = typename Table::Real;
   Table table;
@@ -195,7 +198,7 @@ struct ObstacleGradient {
 
   [[gnu::noinline]] KOKKOS_FUNCTION void add(int i) const {
     if (!table.free(i)) return;
-    ObstacleForce const r = obstacle_force<Barrier>(table, i, x, numbers > 0);
+    ObstacleForce const r = obstacle_force(table, i, x, numbers > 0);
     if (r.contacts == 0) return;
     int const v = table.vertex(i);
     for (int c = 0; c < 3; ++c) g(v, c) += static_cast<Real>(scale * r.gradient[c]);
@@ -208,24 +211,24 @@ struct ObstacleGradient {
   KOKKOS_FUNCTION void operator()(int i) const { add(i); }
 };
 /// And E(x) - E(x - alpha p).
-template <class Barrier, class Table, int numbers, class CurvatureField>
+template <class Table, int numbers, class CurvatureField>
 struct ObstacleGradientAfter {
-  ObstacleGradient<Barrier, Table, numbers, CurvatureField> gradient;
-  ObstacleChange<Barrier, Table> change;
+  ObstacleGradient<Table, numbers, CurvatureField> gradient;
+  ObstacleChange<Table> change;
   KOKKOS_FUNCTION void operator()(int i, Sums<double, 1>& sum) const {
     gradient.add(i);
     sum[0] += change.change(i);
   }
 };
 
-template <class Barrier, class Table>
+template <class Table>
 struct ObstacleForm {
   Table table;
   typename Table::Positions x;
   typename Table::Vectors p;
   [[gnu::noinline]] KOKKOS_FUNCTION double form(int i) const {
     if (!table.free(i)) return 0;
-    ObstacleForce const r = obstacle_force<Barrier>(table, i, x, true);
+    ObstacleForce const r = obstacle_force(table, i, x, true);
     if (r.contacts == 0) return 0;
     return Kokkos::max(quadratic(r.hessian, table.step(i, p, 1)), 0.0);
   }
@@ -241,7 +244,7 @@ struct ObstacleShares {
   KOKKOS_FUNCTION void operator()(int i) const { shares(of.table.vertex(i)) += scale * of.form(i); }
 };
 
-template <class Barrier, class Table>
+template <class Table>
 struct ObstacleProduct {
   using Real = typename Table::Real;
   Table table;
@@ -251,7 +254,7 @@ struct ObstacleProduct {
   typename Table::Vectors hp;
   [[gnu::noinline]] KOKKOS_FUNCTION void add(int i) const {
     if (!table.free(i)) return;
-    ObstacleForce const r = obstacle_force<Barrier>(table, i, x, true);
+    ObstacleForce const r = obstacle_force(table, i, x, true);
     if (r.contacts == 0) return;
     Vec3<double> const y = r.hessian * table.step(i, p, 1);
     int const v = table.vertex(i);
@@ -260,7 +263,7 @@ struct ObstacleProduct {
   KOKKOS_FUNCTION void operator()(int i) const { add(i); }
 };
 
-template <class Barrier, class Table, class S>
+template <class Table, class S>
 struct ObstacleAssemble {
   Table table;
   typename Table::Positions x;
@@ -268,7 +271,7 @@ struct ObstacleAssemble {
   BlockCsr<S, double> matrix;
   [[gnu::noinline]] KOKKOS_FUNCTION void add(int i) const {
     if (!table.free(i)) return;
-    ObstacleForce const r = obstacle_force<Barrier>(table, i, x, true);
+    ObstacleForce const r = obstacle_force(table, i, x, true);
     if (r.contacts > 0) {
       matrix.add(table.vertex(i), table.vertex(i), scale * to_matrix(r.hessian));
     }
@@ -277,7 +280,7 @@ struct ObstacleAssemble {
 };
 
 /// Marks the vertices on which faces act.
-template <class Barrier, class Table, class S>
+template <class Table, class S>
 struct MarkTouched {
   Table table;
   typename Table::Positions x;
@@ -286,17 +289,17 @@ struct MarkTouched {
     if (touched(i)) marks(table.vertex(i)) = 1;
   }
   [[gnu::noinline]] KOKKOS_FUNCTION bool touched(int i) const {
-    return table.free(i) && obstacle_force<Barrier>(table, i, x, false).contacts > 0;
+    return table.free(i) && obstacle_force(table, i, x, false).contacts > 0;
   }
 };
 
 /// The force on the bodies, N, and how many faces act.
-template <class Barrier, class Table>
+template <class Table>
 struct SumObstacleForces {
   Table table;
   typename Table::Positions x;
   [[gnu::noinline]] KOKKOS_FUNCTION ObstacleForce force(int i) const {
-    return table.free(i) ? obstacle_force<Barrier>(table, i, x, false) : ObstacleForce{};
+    return table.free(i) ? obstacle_force(table, i, x, false) : ObstacleForce{};
   }
   KOKKOS_FUNCTION void operator()(int i, Sums<double, 4>& sum) const {
     ObstacleForce const r = force(i);

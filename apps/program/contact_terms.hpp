@@ -42,6 +42,56 @@ std::shared_ptr<ProgramContact<P> const> add_contact_term(AnySteppedTerms<P>& te
                                                           ContactPart<P> const& part,
                                                           ContactOptions const& options);
 
+/// The barrier of the scene, for terms that ask it little: a choice of run time.
+struct AnyBarrier {
+  static constexpr char const* name = "any";
+  static constexpr double curvature_at_half = 1;
+  enum class Kind { log, ipc, log_squared, cubic };
+  Kind kind = Kind::log;
+
+  explicit AnyBarrier(ContactOptions const& options) {
+    std::string const barrier = options.text("barrier");
+    if (barrier == IpcBarrier::name) kind = Kind::ipc;
+    if (barrier == LogSquaredBarrier::name) kind = Kind::log_squared;
+    if (barrier == CubicBarrier::name) kind = Kind::cubic;
+  }
+  AnyBarrier() = default;
+
+  template <class T>
+  KOKKOS_FUNCTION T value(RelativeDistance<T> const& s) const {
+    return ask([&](auto const& barrier) { return barrier.value(s); });
+  }
+  template <class T>
+  KOKKOS_FUNCTION T slope(RelativeDistance<T> const& s) const {
+    return ask([&](auto const& barrier) { return barrier.slope(s); });
+  }
+  template <class T>
+  KOKKOS_FUNCTION T curvature(RelativeDistance<T> const& s) const {
+    return ask([&](auto const& barrier) { return barrier.curvature(s); });
+  }
+  template <class T>
+  KOKKOS_FUNCTION T change(RelativeDistance<T> const& before, RelativeDistance<T> const& after,
+                           RelativeStep<T> const& step) const {
+    return ask([&](auto const& barrier) { return barrier.change(before, after, step); });
+  }
+
+private:
+  template <class Question>
+  KOKKOS_FUNCTION auto ask(Question const& question) const {
+    switch (kind) {
+      case Kind::ipc:
+        return question(Normalised<IpcBarrier>());
+      case Kind::log_squared:
+        return question(Normalised<LogSquaredBarrier>());
+      case Kind::cubic:
+        return question(Normalised<CubicBarrier>());
+      case Kind::log:
+        break;
+    }
+    return question(Normalised<LogBarrier>());
+  }
+};
+
 /// K by the rule of the scene. It is asked when pairs are found, not in inner loops, so the choice
 /// is one of run time.
 struct AnyStiffness {

@@ -39,7 +39,7 @@ struct ToShape {
 template <class P, class Shape>
 class ObstacleHandle final : public ProgramObstacle<P> {
 public:
-  using Term = Obstacle<Shape, Normalised<LogBarrier>, AnyStiffness, P, DefaultSpace>;
+  using Term = Obstacle<Shape, AnyBarrier, AnyStiffness, P, DefaultSpace>;
 
   explicit ObstacleHandle(Term const& term) : term_(term) {}
   void move_to(RigidMap const& pose) const override { term_.move_to(to_pose(pose)); }
@@ -77,6 +77,7 @@ std::shared_ptr<ProgramObstacle<P> const> add_obstacle_term(AnySteppedTerms<P>& 
     Term const term(part.unknowns, part.surface, part.rest, shape,
                     {.dhat = part.dhat,
                      .start_share = options.number("start_share"),
+                     .barrier = AnyBarrier(options),
                      .stiffness = AnyStiffness(options)},
                     to_pose(obstacle.placement));
     terms.add(term);

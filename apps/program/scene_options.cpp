@@ -213,9 +213,7 @@ std::span<OptionKey const> contact_keys() {
        std::string("log"),
        {},
        {"log", "ipc", "log_squared", "cubic"},
-       "energy over distance of a pair; all but log in fp64 alone. Obstacles that are formulas "
-       "keep "
-       "log"},
+       "energy over distance of a pair; all but log in fp64 alone"},
       {"curvature",
        std::string("gauss_newton"),
        {},

@@ -2,11 +2,15 @@
 // have to force bodies through each other.
 #include "scene_run.hpp"
 
+#include <taut/contact/barrier.hpp>
 #include <taut/core/report/error.hpp>
 
 #include <catch2/generators/catch_generators.hpp>
 #include <catch2/matchers/catch_matchers_exception.hpp>
+#include <catch2/matchers/catch_matchers_floating_point.hpp>
 #include <catch2/matchers/catch_matchers_string.hpp>
+
+#include <cmath>
 
 using namespace taut;
 using namespace taut::test;
@@ -92,6 +96,47 @@ TEST_CASE("every policy of contact runs by its name", "[contact]") {
   CHECK(run_command(run.options) == 0);
   CHECK(run.summary().at("steps_converged") == 6);
   CHECK(run.summary().at("most_contacts") > 0);
+}
+
+TEST_CASE("a floor that is a formula has the barrier of the scene", "[contact]") {
+  // Under its own weight, 1e4 Pa, a cube rests where the barrier of a layer of 1e5 Pa pushes back.
+  std::string const rest = R"(name = "rest"
+gravity = [0, -10, 0]
+
+[time]
+step = 0.05
+frames = 30
+
+[[object]]
+name = "cube"
+shape = { kind = "box", size = [1, 1, 1], resolution = 1 }
+translate = [0, 0.56, 0]
+material = { young = 1e7, poisson = 0, density = 1000 }
+
+[[obstacle]]
+name = "floor"
+shape = { kind = "half_space" }
+
+[contact]
+dhat = 0.05
+stiffness = "given"
+pressure = 1e5
+
+[solver]
+tolerance = 1e-6
+)";
+  auto const rests_at = [&]<class B>(B) {
+    CAPTURE(B::name);
+    ContactRun run(rest, {std::string("contact.barrier=") + B::name});
+    REQUIRE(run_command(run.options) == 0);
+    double const x = run.report().back().at("smallest_gap");
+    double const slope = Normalised<B>::slope(RelativeDistance<double>{x, 1 - x, std::log(x)});
+    CHECK_THAT(slope, Catch::Matchers::WithinRel(-0.1, 0.02));
+  };
+  rests_at(LogBarrier());
+  rests_at(IpcBarrier());
+  rests_at(LogSquaredBarrier());
+  rests_at(CubicBarrier());
 }
 
 TEST_CASE("the paper's clamp is run as it is, and blamed for what it lets through", "[contact]") {
