@@ -66,9 +66,11 @@ struct StackTerms {
     // A band from the lone cube to the first of the second stack: one body from now on.
     std::vector<std::array<int, 2>> bands;
     for (int k = 0; k < 3; ++k) bands.push_back({first_of(4) + k, first_of(2) + 2 * k});
-    Touch const touch(body.unknowns, surface, body.rest.points, {.dhat = Stacks::dhat});
+    Touch const touch(body.unknowns, surface, body.rest.points,
+                      {.dhat = Stacks::dhat, .start_share = 0});
     Ground const ground(body.unknowns, surface, body.rest.points,
-                        HalfSpace{{20.78, 0, 0}, {-1, 0, 0}}, {.dhat = Stacks::dhat});
+                        HalfSpace{{20.78, 0, 0}, {-1, 0, 0}},
+                        {.dhat = Stacks::dhat, .start_share = 0});
     Friction<P> friction(body.unknowns, body.rest.points, {.stick_speed = 0.01});
     friction.add(touch, 0.4);
     friction.add(ground, 0.3);

@@ -342,8 +342,11 @@ TEMPLATE_TEST_CASE("surfaces of next to nothing", "[contact]", BruteForce<Defaul
   soup.surface = make_surface({{0, 1, 2}, {0, 1, 3}}, {0, 0, 0, 0});
   HostCandidates const found = find<TestType>(soup, motion_of<Fp64, S>(soup, 0));
   CHECK(found.point_triangle == std::vector<std::array<int, 4>>{{2, 0, 1, 3}, {3, 0, 1, 2}});
-  // Edge 1-2 is of a larger class than 0-3, which asks for it; then 1-3 for 0-2.
-  CHECK(found.edge_edge == std::vector<std::array<int, 4>>{{0, 3, 1, 2}, {0, 2, 1, 3}});
+  CHECK(found.edge_edge == std::vector<std::array<int, 4>>{{0, 2, 1, 3}, {0, 3, 1, 2}});
+  // Edge 0-2 is much longer than 1-3, which asks for it, after 0-3 has.
+  soup.x[2] = {0, 100, 0};
+  HostCandidates const longer = find<TestType>(soup, motion_of<Fp64, S>(soup, 0));
+  CHECK(longer.edge_edge == std::vector<std::array<int, 4>>{{0, 3, 1, 2}, {0, 2, 1, 3}});
 }
 
 TEST_CASE("what cannot be searched is refused", "[contact]") {

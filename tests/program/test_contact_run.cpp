@@ -111,7 +111,7 @@ frames = 30
 name = "cube"
 shape = { kind = "box", size = [1, 1, 1], resolution = 1 }
 translate = [0, 0.56, 0]
-material = { young = 1e7, poisson = 0, density = 1000 }
+material = { model = "neo_hookean", young = 1e7, poisson = 0, density = 1000 }
 
 [[obstacle]]
 name = "floor"
