@@ -184,6 +184,10 @@ struct Motion {
   }
 };
 
+/// A mask of vertices of the mesh; empty: all of them.
+template <class S>
+using VertexMask = Kokkos::View<std::uint8_t const*, typename S::memory>;
+
 /// n boxes with their ranks, and one box that encloses the vertices.
 template <class S>
 struct BoxSet {
@@ -218,6 +222,7 @@ struct VertexBoxes {
   Vec3<double> centre;
   double radius, centre_size;
   Array<double, S> own_radius;  ///< in addition, m; empty: none
+  VertexMask<S> only;
   Kokkos::View<SearchBox*, typename S::memory> of_vertex;
 
   KOKKOS_FUNCTION void operator()(int i) const {
@@ -225,6 +230,7 @@ struct VertexBoxes {
     constexpr double epsilon = Kokkos::Experimental::epsilon_v<typename Precision::real>;
     constexpr double epsilon_here = Kokkos::Experimental::epsilon_v<double>;
     int const v = surface.vertex(i);
+    if (only.extent(0) > 0 && only(v) == 0) return;
     Vec3<double> const x = motion.start(v), step = motion.step(v);
     double size_x = 0, size_step = 0;
     for (int c = 0; c < 3; ++c) {
@@ -246,10 +252,11 @@ struct VertexBoxes {
   }
 };
 
-/// The box of primitive i, from those of its N vertices.
+/// The box of primitive i, from those of its N vertices, if one of them is in `only`.
 template <class S, int N>
 struct PrimitiveBoxes {
   typename SurfaceViews<S>::Indices corner;
+  VertexMask<S> only;
   Kokkos::View<SearchBox const*, typename S::memory> of_vertex;
   Kokkos::View<SearchBox*, typename S::memory> box;
   Kokkos::View<Rank*, typename S::memory> rank;
@@ -257,6 +264,11 @@ struct PrimitiveBoxes {
   float length;   ///< of most boxes, m
 
   KOKKOS_FUNCTION void operator()(int i) const {
+    if (only.extent(0) > 0) {
+      int any = 0;
+      for (int a = 0; a < N; ++a) any |= only(corner(N * i + a));
+      if (any == 0) return;
+    }
     SearchBox b = of_vertex(corner(N * i));
     for (int a = 1; a < N; ++a) b = join(b, of_vertex(corner(N * i + a)));
     double const grow = budget * double(longest_side(b));
@@ -287,11 +299,12 @@ public:
 
   /// So that primitives that come closer than `radius` (m) during the motion have boxes that
   /// overlap, wherever each vertex is within `own_radius` (m, per vertex of the mesh) of where the
-  /// motion says. Throws Error if a vertex of the surface is not at a finite place, or the radius
-  /// not a finite length.
+  /// motion says. If `only` some vertices have got another motion or radius of their own since the
+  /// last time, it is enough to name them. Throws Error if a vertex of the surface is not at a
+  /// finite place, or the radius not a finite length.
   template <class Precision>
   void compute(Motion<Precision, S> const& motion, double radius,
-               Array<double, S> const& own_radius = {}) {
+               Array<double, S> const& own_radius = {}, VertexMask<S> const& only = {}) {
     if (!(radius >= 0 && radius <= std::numeric_limits<double>::max())) {
       throw Error("broad phase: pairs closer than {} m cannot be searched: ask for a length",
                   radius);
@@ -301,23 +314,22 @@ public:
         "box_bounds", surface_.vertices(), kernels::MotionCloud<Precision, S>{surface_, motion});
     refuse_stray(bounds);
     if (surface_.vertices() == 0) return;
-    Vec3<double> centre;
-    double centre_size = 0;
-    for (int c = 0; c < 3; ++c) {
-      centre[c] = 0.5 * bounds.low[c] + 0.5 * bounds.high[c];
-      centre_size = std::max(centre_size, std::abs(centre[c]));
+    if (only.extent(0) == 0) {
+      for (int c = 0; c < 3; ++c) centre_[c] = 0.5 * bounds.low[c] + 0.5 * bounds.high[c];
     }
+    double centre_size = 0;
+    for (double const x : centre_.v) centre_size = std::max(centre_size, std::abs(x));
     for_each<S>("vertex_boxes", surface_.vertices(),
-                kernels::VertexBoxes<Precision, S>{surface_, motion, centre, radius, centre_size,
-                                                   own_radius, of_vertex_});
+                kernels::VertexBoxes<Precision, S>{surface_, motion, centre_, radius, centre_size,
+                                                   own_radius, only, of_vertex_});
     double const budget = 32.0 * std::numeric_limits<typename Precision::real>::epsilon();
-    primitives<1>("point_boxes", surface_.vertex, budget, points_);
-    primitives<2>("edge_boxes", surface_.edge, budget, edges_);
-    primitives<3>("triangle_boxes", surface_.triangle, budget, triangles_);
+    primitives<1>("point_boxes", surface_.vertex, budget, only, points_);
+    primitives<2>("edge_boxes", surface_.edge, budget, only, edges_);
+    primitives<3>("triangle_boxes", surface_.triangle, budget, only, triangles_);
     SearchBox all;
     for (int c = 0; c < 3; ++c) {
-      all.low[c] = kernels::round_down(bounds.low[c] - centre[c]);
-      all.high[c] = kernels::round_up(bounds.high[c] - centre[c]);
+      all.low[c] = kernels::round_down(bounds.low[c] - centre_[c]);
+      all.high[c] = kernels::round_up(bounds.high[c] - centre_[c]);
     }
     points_.all = edges_.all = triangles_.all = all;
   }
@@ -350,14 +362,15 @@ private:
   }
   template <int N>
   void primitives(char const* name, typename SurfaceViews<S>::Indices const& corner, double budget,
-                  BoxSet<S> const& to) const {
+                  VertexMask<S> const& only, BoxSet<S> const& to) const {
     for_each<S>(
         name, to.count,
-        kernels::PrimitiveBoxes<S, N>{corner, of_vertex_, to.box, to.rank, budget, length_});
+        kernels::PrimitiveBoxes<S, N>{corner, only, of_vertex_, to.box, to.rank, budget, length_});
   }
 
   SurfaceViews<S> surface_;
   float length_ = 0;
+  Vec3<double> centre_{0, 0, 0};
   Kokkos::View<SearchBox*, typename S::memory> of_vertex_;
   BoxSet<S> points_, edges_, triangles_;
 };

@@ -257,16 +257,20 @@ private:
                     kernels::SettleAnchors<Space>{surface(), s, anchors_});
     anchors_.at.leader = -1;
     lead_ = {};
+    settled_ = true;
     point_triangle_.keep(surface(), filter(near), anchors_.at.from);
     edge_edge_.keep(surface(), filter(near), anchors_.at.from);
   }
-  /// Boxes around the anchors.
-  void compute_boxes(kernels::WithinReach<Precision, Space> const& near) {
+  /// Boxes around the anchors; of the others they have not changed, if `only` some are named.
+  void compute_boxes(kernels::WithinReach<Precision, Space> const& near,
+                     VertexMask<Space> const& only = {}) {
     double const reach = std::max(reach_.within, reach_.between);
     Motion<Fp64, Space> at_anchors = anchors_.motion();
     at_anchors.fixed = near.motion.fixed;
     at_anchors.between_fixed = near.motion.between_fixed;
-    boxes_.compute(at_anchors, near.activation.dhat + reach, anchors_.radius);
+    boxes_.compute(at_anchors, near.activation.dhat + reach, anchors_.radius,
+                   settled_ ? VertexMask<Space>() : only);
+    settled_ = false;
     triangles_.build(boxes_.triangles());
     edges_.build(boxes_.edges());
   }
@@ -283,7 +287,7 @@ private:
   }
 
   void search_strays(kernels::WithinReach<Precision, Space> const& near) {
-    compute_boxes(near);
+    compute_boxes(near, stray_);
     points_.build(boxes_.points());
     kernels::Held<Space> const held{near.motion.fixed, near.motion.between_fixed};
     point_triangle_.drop(surface(), stray_);
@@ -329,6 +333,7 @@ private:
   NeighbourList<point_triangle, Space> point_triangle_;
   NeighbourList<edge_edge, Space> edge_edge_;
   bool known_ = false, between_fixed_ = false;
+  bool settled_ = false;  ///< all anchors have moved since boxes were made
   FixedMask<Space> fixed_;
   NeighbourCounters counters_;
 };

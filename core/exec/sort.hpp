@@ -4,12 +4,13 @@
 // Least significant digit first (Knuth, The Art of Computer Programming 3, section 5.2.5): in each
 // pass every chunk of the keys counts its digits, a scan over (digit, chunk) says where each chunk
 // puts the keys of a digit, and the chunks move their keys there in order. One thread does a chunk,
-// so nothing is atomic.
+// so nothing is atomic. Few buckets are sorted into on the host as if they were one digit.
 #pragma once
 
 #include <taut/core/exec/copy.hpp>
 #include <taut/core/exec/scan.hpp>
 
+#include <algorithm>
 #include <bit>
 #include <type_traits>
 
@@ -79,6 +80,48 @@ struct CopyBuckets {
   Kokkos::View<int const*, typename S::memory> bucket;
   Kokkos::View<std::uint32_t*, typename S::memory> key;
   KOKKOS_FUNCTION void operator()(int k) const { key(k) = static_cast<std::uint32_t>(bucket(k)); }
+};
+
+/// Items in chunks, with a counter per bucket and chunk.
+template <class S>
+struct BucketPass {
+  Kokkos::View<int const*, typename S::memory> bucket;
+  Kokkos::View<int*, typename S::memory> count;  ///< [bucket][chunk]
+  int n, buckets, chunks;
+
+  KOKKOS_FUNCTION int first(int chunk) const {
+    return static_cast<int>(std::int64_t(n) * chunk / chunks);
+  }
+  KOKKOS_FUNCTION int& counter(int b, int chunk) const { return count(b * chunks + chunk); }
+};
+
+template <class S>
+struct CountItems : BucketPass<S> {
+  KOKKOS_FUNCTION void operator()(int chunk) const {
+    for (int b = 0; b < this->buckets; ++b) this->counter(b, chunk) = 0;
+    for (int k = this->first(chunk); k < this->first(chunk + 1); ++k) {
+      ++this->counter(this->bucket(k), chunk);
+    }
+  }
+};
+
+/// Of bucket b, once the counters are places.
+template <class S>
+struct BeginCounted : BucketPass<S> {
+  Kokkos::View<int*, typename S::memory> begin;
+  KOKKOS_FUNCTION void operator()(int b) const {
+    begin(b) = b < this->buckets ? this->counter(b, 0) : this->n;
+  }
+};
+
+template <class S>
+struct PlaceItems : BucketPass<S> {
+  Kokkos::View<int*, typename S::memory> order;
+  KOKKOS_FUNCTION void operator()(int chunk) const {
+    for (int k = this->first(chunk); k < this->first(chunk + 1); ++k) {
+      order(this->counter(this->bucket(k), chunk)++) = k;
+    }
+  }
 };
 
 /// From sorted keys, for k in [0, n]: the buckets after that of item k - 1 up to that of item k
@@ -168,7 +211,8 @@ public:
   using Indices = Kokkos::View<int*, typename S::memory>;
 
   BucketSort() = default;
-  explicit BucketSort(int max_items) : sort_(max_items), key_("bucket_key", max_items) {}
+  explicit BucketSort(int max_items)
+      : sort_(max_items), key_("bucket_key", max_items), count_("bucket_count", most(max_items)) {}
 
   /// Item k < n goes into bucket(k). Afterwards bucket b holds the items order(begin(b)), ...,
   /// order(begin(b + 1) - 1), ascending; `begin` has buckets + 1 entries. Throws Error if an item
@@ -176,15 +220,25 @@ public:
   void sort(int n, Kokkos::View<int const*, typename S::memory> const& bucket, int buckets,
             Indices const& begin, Indices const& order) const {
     if (key_.extent(0) < std::size_t(n) || bucket.extent(0) < std::size_t(n) ||
-        begin.extent(0) < std::size_t(buckets) + 1) {
+        begin.extent(0) < std::size_t(buckets) + 1 || order.extent(0) < std::size_t(n)) {
       throw Error(
-          "bucket sort: {} items in {} buckets do not fit scratch memory for {}, {} items "
-          "and {} begins",
-          n, buckets, key_.extent(0), bucket.extent(0), begin.extent(0));
+          "bucket sort: {} items in {} buckets do not fit scratch memory for {}, {} items, {} "
+          "begins "
+          "and an order of {}",
+          n, buckets, key_.extent(0), bucket.extent(0), begin.extent(0), order.extent(0));
     }
     int const stray = minimum<S>("bucket_check", n, n, kernels::FindStray<S>{bucket, buckets});
     if (stray < n) {
       throw Error("bucket sort: item {} names a bucket that is not one of the {}", stray, buckets);
+    }
+    if (int const chunks = counted_chunks(n, buckets); chunks > 0) {
+      kernels::BucketPass<S> const pass{bucket, count_, n, buckets, chunks};
+      for_each<S>("bucket_count", chunks, kernels::CountItems<S>{pass});
+      Indices const counts(count_, Kokkos::make_pair(0, buckets * chunks));
+      exclusive_scan<S, int>("bucket_scan", counts);
+      for_each<S>("bucket_begin", buckets + 1, kernels::BeginCounted<S>{pass, begin});
+      for_each<S>("bucket_place", chunks, kernels::PlaceItems<S>{pass, order});
+      return;
     }
     for_each<S>("bucket_copy", n, kernels::CopyBuckets<S>{bucket, key_});
     sort_.sort(n, key_, order);
@@ -192,8 +246,19 @@ public:
   }
 
 private:
+  /// Counters, so that they take no longer than the items: none on a device, whose chunks are
+  /// short.
+  static int most(int items) { return S::on_host ? items : 0; }
+  /// Into how many chunks to count, one per thread at most; 0: there are too many buckets.
+  int counted_chunks(int n, int buckets) const {
+    if (!S::on_host || buckets < 1) return 0;
+    int const chunks = std::min(S::instance().concurrency(), n / sort_.chunk_length + 1);
+    return std::min(chunks, most(n) / buckets);
+  }
+
   StableSort<S, std::uint32_t> sort_;
   Kokkos::View<std::uint32_t*, typename S::memory> key_;
+  Indices count_;
 };
 
 }  // namespace taut
