@@ -252,11 +252,23 @@ struct VertexBoxes {
   }
 };
 
+/// Whether a primitive of N vertices has one in a mask.
+template <class S, int N>
+struct HasVertexIn {
+  typename SurfaceViews<S>::Indices corner;
+  VertexMask<S> mask;
+  KOKKOS_FUNCTION int operator()(int i) const {
+    int has = 0;
+    for (int a = 0; a < N; ++a) has |= mask(corner(N * i + a));
+    return has;
+  }
+};
+
 /// The box of primitive i, from those of its N vertices, if one of them is in `only`.
 template <class S, int N>
 struct PrimitiveBoxes {
   typename SurfaceViews<S>::Indices corner;
-  VertexMask<S> only;
+  HasVertexIn<S, N> is_in_only;
   Kokkos::View<SearchBox const*, typename S::memory> of_vertex;
   Kokkos::View<SearchBox*, typename S::memory> box;
   Kokkos::View<Rank*, typename S::memory> rank;
@@ -264,11 +276,7 @@ struct PrimitiveBoxes {
   float length;   ///< of most boxes, m
 
   KOKKOS_FUNCTION void operator()(int i) const {
-    if (only.extent(0) > 0) {
-      int any = 0;
-      for (int a = 0; a < N; ++a) any |= only(corner(N * i + a));
-      if (any == 0) return;
-    }
+    if (is_in_only.mask.extent(0) > 0 && is_in_only(i) == 0) return;
     SearchBox b = of_vertex(corner(N * i));
     for (int a = 1; a < N; ++a) b = join(b, of_vertex(corner(N * i + a)));
     double const grow = budget * double(longest_side(b));
@@ -363,9 +371,9 @@ private:
   template <int N>
   void primitives(char const* name, typename SurfaceViews<S>::Indices const& corner, double budget,
                   VertexMask<S> const& only, BoxSet<S> const& to) const {
-    for_each<S>(
-        name, to.count,
-        kernels::PrimitiveBoxes<S, N>{corner, only, of_vertex_, to.box, to.rank, budget, length_});
+    for_each<S>(name, to.count,
+                kernels::PrimitiveBoxes<S, N>{
+                    corner, {corner, only}, of_vertex_, to.box, to.rank, budget, length_});
   }
 
   SurfaceViews<S> surface_;

@@ -271,7 +271,7 @@ struct AnchorStrays {
   SurfaceViews<S> surface;
   SeenFromAnchors<Precision, S> seen;
   double least_radius;
-  Kokkos::View<std::uint8_t const*, typename S::memory> stray;
+  VertexMask<S> stray;
   Anchors<S> anchors;
 
   KOKKOS_FUNCTION void operator()(int i) const {
@@ -333,18 +333,6 @@ struct SettleAnchors {
   }
 };
 
-/// Whether a primitive of `corners` vertices has a stray one.
-template <class S, int corners>
-struct HasStray {
-  typename SurfaceViews<S>::Indices corner;
-  Kokkos::View<std::uint8_t const*, typename S::memory> stray;
-  KOKKOS_FUNCTION int operator()(int i) const {
-    int has = 0;
-    for (int a = 0; a < corners; ++a) has |= stray(corner(corners * i + a));
-    return has;
-  }
-};
-
 /// Writes the numbers of those that `chosen` says 1 of to their places.
 template <class S, class Chosen>
 struct ListChosen {
@@ -359,7 +347,7 @@ struct ListChosen {
 /// Of triangles and the points that they ask for: those that do not ask themselves.
 template <class S>
 struct PairTrianglePoint : PairingBase<3, S> {
-  HasStray<S, 1> asks;
+  HasVertexIn<S, 1> asks;
 
   template <int n>
   KOKKOS_FUNCTION unsigned accept(AskingGroup<3, n> const& group, unsigned bits, int j) const {
@@ -370,7 +358,7 @@ struct PairTrianglePoint : PairingBase<3, S> {
 /// Of edges and all others; of two that ask, the first.
 template <class S>
 struct PairEdgeAnew : PairingBase<2, S> {
-  HasStray<S, 2> asks;
+  HasVertexIn<S, 2> asks;
 
   template <int n>
   KOKKOS_FUNCTION unsigned accept(AskingGroup<2, n> const& group, unsigned bits, int j) const {
@@ -411,7 +399,7 @@ struct KnownPrimitives : FoundPrimitives<kind, S> {
 template <PairKind kind, class S>
 struct KeepsAnchors {
   FoundPrimitives<kind, S> from;
-  Kokkos::View<std::uint8_t const*, typename S::memory> stray;
+  VertexMask<S> stray;
   Kokkos::View<int*, typename S::memory> kept;
   KOKKOS_FUNCTION void operator()(int k) const {
     int v[4], strays = 0;

@@ -37,8 +37,7 @@ public:
 
   void clear() { count_ = 0; }
   /// Drops the pairs that have a stray vertex.
-  void drop(SurfaceViews<S> const& surface,
-            Kokkos::View<std::uint8_t const*, typename S::memory> const& stray) {
+  void drop(SurfaceViews<S> const& surface, VertexMask<S> const& stray) {
     grow(place_, "neighbour_place", count_);
     for_each<S>("neighbours_drop", count_,
                 kernels::KeepsAnchors<kind, S>{{surface, pairs_}, stray, place_});
@@ -292,9 +291,9 @@ private:
     kernels::Held<Space> const held{near.motion.fixed, near.motion.between_fixed};
     point_triangle_.drop(surface(), stray_);
     edge_edge_.drop(surface(), stray_);
-    kernels::HasStray<Space, 1> const point{surface().vertex, stray_};
-    kernels::HasStray<Space, 2> const edge{surface().edge, stray_};
-    kernels::HasStray<Space, 3> const triangle{surface().triangle, stray_};
+    kernels::HasVertexIn<Space, 1> const point{surface().vertex, stray_};
+    kernels::HasVertexIn<Space, 2> const edge{surface().edge, stray_};
+    kernels::HasVertexIn<Space, 3> const triangle{surface().triangle, stray_};
     ask(near, askers(boxes_.points(), point), triangles_.index(),
         kernels::PairPointTriangle<Space>{{surface(), held}});
     ask(near, askers(boxes_.triangles(), triangle), points_.index(),

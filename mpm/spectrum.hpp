@@ -4,26 +4,12 @@
 // to 15 percent below it.
 #pragma once
 
+#include <taut/core/sparse/ritz_value.hpp>
 #include <taut/mpm/level_operator.hpp>
 
 #include <cmath>
-#include <vector>
 
 namespace taut {
-
-/// The largest eigenvalue of the symmetric tridiagonal matrix with these diagonals, by bisection;
-/// `beside` has one entry less.
-double largest_tridiagonal(std::vector<double> const& diagonal, std::vector<double> const& beside);
-
-/// What Lanczos' method knows of the largest eigenvalue.
-struct RitzValue {
-  double value = 1;     ///< from below
-  double residual = 0;  ///< an eigenvalue lies within this of it
-};
-/// After as many steps, one or more, as there are entries in both; all of `beside` but the last are
-/// above 0.
-RitzValue largest_ritz_value(std::vector<double> const& diagonal,
-                             std::vector<double> const& beside);
 
 namespace kernels {
 
@@ -162,7 +148,7 @@ double largest_eigenvalue(A const& a, LevelVectors<T, S> const& v, int steps = 2
   if (n == 0) return 1;
   Reducer<S> const reducer(n, 1);
   for_each<S>("lanczos_start", n, kernels::ScatterResidual<S, T>{a.nodes(), a.inverse(), v.r});
-  std::vector<double> diagonal, beside;
+  LanczosByConjugates lanczos;
   kernels::LanczosResidual<S, T> residual{a.inverse(), v.r, v.y, T(0)};
   VectorField<T, S> z = v.y;
   auto const reduce = [&] {
@@ -175,7 +161,7 @@ double largest_eigenvalue(A const& a, LevelVectors<T, S> const& v, int steps = 2
     }
   };
   double rho = reduce();
-  double beta = 0, alpha_before = 1;
+  double beta = 0;
   RitzValue found;
   for (int k = 0; k < steps; ++k) {
     for_each<S>("lanczos_direction", n, kernels::LanczosDirection<S, T>{z, v.d, T(beta)});
@@ -187,12 +173,9 @@ double largest_eigenvalue(A const& a, LevelVectors<T, S> const& v, int steps = 2
     residual.alpha = T(alpha);
     double const next = reduce();
     if (!std::isfinite(next)) break;
-    diagonal.push_back(1 / alpha + beta / alpha_before);
     beta = next / rho;
-    beside.push_back(std::sqrt(std::max(beta, 0.0)) / alpha);
-    alpha_before = alpha;
     rho = next;
-    found = largest_ritz_value(diagonal, beside);
+    found = lanczos.add(alpha, beta);
     if (k > 0 && found.residual <= enough * found.value) break;
   }
   return found.value + found.residual;

@@ -108,7 +108,7 @@ private:
     }
     typename Schwarz<P, Space>::Params schwarz;
     schwarz.refresh = refresh_of(options_, rare_refresh(options_));
-    schwarz.aggregate = name == "schwarz_16" ? 16 : 32;
+    schwarz.levels.aggregate = name == "schwarz_16" ? 16 : 32;
     return schwarz;
   }
 

@@ -27,11 +27,10 @@ std::span<OptionKey const> solver_keys() {
        std::string("auto"),
        {},
        {"auto", "identity", "jacobi", "block_jacobi", "schwarz_16", "schwarz_32", "multigrid"},
-       "schwarz: dense aggregates of 16 or 32 vertices with a coarse level, of meshes; multigrid: "
-       "a "
-       "cycle over the nodes of a grid, of material points; auto: multigrid for these, and for "
-       "meshes schwarz_32 where a step reaches over several elements, otherwise block_jacobi "
-       "(`taut plan` says why)"},
+       "schwarz: dense aggregates of 16 or 32 vertices on levels of smoothed aggregation, of "
+       "meshes; multigrid: a cycle over the nodes of a grid, of material points; auto: multigrid "
+       "for these, and for meshes schwarz_32 where a step reaches over several elements, otherwise "
+       "block_jacobi (`taut plan` says why)"},
       {"refresh",
        std::string("auto"),
        {},

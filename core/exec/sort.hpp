@@ -212,7 +212,9 @@ public:
 
   BucketSort() = default;
   explicit BucketSort(int max_items)
-      : sort_(max_items), key_("bucket_key", max_items), count_("bucket_count", most(max_items)) {}
+      : sort_(max_items),
+        key_("bucket_key", max_items),
+        count_("bucket_count", S::on_host ? max_items : 0) {}
 
   /// Item k < n goes into bucket(k). Afterwards bucket b holds the items order(begin(b)), ...,
   /// order(begin(b + 1) - 1), ascending; `begin` has buckets + 1 entries. Throws Error if an item
@@ -222,9 +224,8 @@ public:
     if (key_.extent(0) < std::size_t(n) || bucket.extent(0) < std::size_t(n) ||
         begin.extent(0) < std::size_t(buckets) + 1 || order.extent(0) < std::size_t(n)) {
       throw Error(
-          "bucket sort: {} items in {} buckets do not fit scratch memory for {}, {} items, {} "
-          "begins "
-          "and an order of {}",
+          "bucket sort: {} items in {} buckets do not fit scratch memory for {}, {} items, "
+          "{} begins and an order of {}",
           n, buckets, key_.extent(0), bucket.extent(0), begin.extent(0), order.extent(0));
     }
     int const stray = minimum<S>("bucket_check", n, n, kernels::FindStray<S>{bucket, buckets});
@@ -246,14 +247,12 @@ public:
   }
 
 private:
-  /// Counters, so that they take no longer than the items: none on a device, whose chunks are
-  /// short.
-  static int most(int items) { return S::on_host ? items : 0; }
-  /// Into how many chunks to count, one per thread at most; 0: there are too many buckets.
+  /// Into how many chunks to count, one per thread at most, with no more counters than items; 0: on
+  /// a device, whose chunks are short, and where there are too many buckets.
   int counted_chunks(int n, int buckets) const {
     if (!S::on_host || buckets < 1) return 0;
     int const chunks = std::min(S::instance().concurrency(), n / sort_.chunk_length + 1);
-    return std::min(chunks, most(n) / buckets);
+    return std::min(chunks, n / buckets);
   }
 
   StableSort<S, std::uint32_t> sort_;

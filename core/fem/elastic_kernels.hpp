@@ -312,36 +312,58 @@ struct AssembleColour {
   Matrix matrix;
   double scale;
 
+  /// Elements side by side: in fp64 whatever the precision, a register of them on the host.
+  static constexpr int width = S::on_host ? host_lanes<double> : 1;
+  using T = typename PackOf<double, width>::type;
+
   KOKKOS_FUNCTION void operator()(int n) const {
     constexpr int lanes = PatchViews<S, typename Precision::real>::lanes;
     int const patch = colour(n);
-    int const* vertex = patches.vertex.data() + patches.local_begin(patch);
-    auto const lame = materials(patches.material(patch));
+    auto const lame = Material::template cast<T>(materials(patches.material(patch)));
     for (int e = patches.pack_begin(patch) * lanes; e < patches.pack_begin(patch + 1) * lanes;
-         ++e) {
-      auto const* rest = patches.rest.data() + std::size_t(e / lanes) * 10 * lanes + e % lanes;
-      auto const* corner = patches.corner.data() + std::size_t(e / lanes) * 4 * lanes + e % lanes;
-      double const weight = scale * double(rest[9 * lanes]);
-      if (weight == 0) continue;  // padding
-      int v[4];
-      for (int a = 0; a < 4; ++a) v[a] = vertex[corner[a * lanes] / 4];
-      Mat3<double> B, D;
-      for (int k = 0; k < 9; ++k) B.a[k] = double(rest[k * lanes]);
-      for (int j = 0; j < 3; ++j)
-        for (int i = 0; i < 3; ++i) D(i, j) = double(x(v[j], i)) - double(x(v[3], i));
-      auto const frame = Material::frame(Material::evaluate(lame, D * B));
-      Vec3<double> beta[4];
-      for (int a = 0; a < 4; ++a) beta[a] = transpose_times(frame.V, shape_gradient(B, a));
-      for (int a = 0; a < 4; ++a) {
-        if (fixed(v[a])) continue;
-        for (int b = a; b < 4; ++b) {
-          if (fixed(v[b])) continue;
-          Mat3<double> const h = weight * frame.vertex_pair(beta[a], beta[b]);
-          matrix.add(v[a], v[b], h);
-          if (a != b) matrix.add(v[b], v[a], transpose(h));
-        }
+         e += width) {
+      add(patch, lame, e / lanes, e % lanes);
+    }
+  }
+
+private:
+  /// The elements of a pack from `lane` on.
+  KOKKOS_FUNCTION void add(int patch, typename Material::template Parameters<T> const& lame,
+                           int pack, int lane) const {
+    constexpr int lanes = PatchViews<S, typename Precision::real>::lanes;
+    int const* const vertex = patches.vertex.data() + patches.local_begin(patch);
+    auto const* const rest = patches.rest.data() + std::size_t(pack) * 10 * lanes + lane;
+    auto const* const corner = patches.corner.data() + std::size_t(pack) * 4 * lanes + lane;
+    int v[4][width];
+    double number[9][width], edge[9][width], weight[width];
+    for (int l = 0; l < width; ++l) {
+      weight[l] = scale * double(rest[9 * lanes + l]);
+      for (int a = 0; a < 4; ++a) v[a][l] = vertex[corner[a * lanes + l] / 4];
+      for (int k = 0; k < 9; ++k) {
+        number[k][l] = double(rest[k * lanes + l]);
+        edge[k][l] = double(x(v[k / 3][l], k % 3)) - double(x(v[3][l], k % 3));
       }
     }
+    Mat3<T> B, D;
+    for (int k = 0; k < 9; ++k) {
+      B.a[k] = load<T>(number[k]);
+      D.a[k] = load<T>(edge[k]);
+    }
+    auto const frame = Material::frame(Material::evaluate(lame, D * B));
+    Vec3<T> beta[4];
+    for (int a = 0; a < 4; ++a) beta[a] = transpose_times(frame.V, shape_gradient(B, a));
+    for (int a = 0; a < 4; ++a)
+      for (int b = a; b < 4; ++b) {
+        Mat3<T> const pair = load<T>(weight) * frame.vertex_pair(beta[a], beta[b]);
+        for (int k = 0; k < 9; ++k) store(pair.a[k], number[k]);
+        for (int l = 0; l < width; ++l) {
+          if (weight[l] == 0 || fixed(v[a][l]) || fixed(v[b][l])) continue;  // or padding
+          Mat3<double> h;
+          for (int k = 0; k < 9; ++k) h.a[k] = number[k][l];
+          matrix.add(v[a][l], v[b][l], h);
+          if (a != b) matrix.add(v[b][l], v[a][l], transpose(h));
+        }
+      }
   }
 };
 

@@ -2,6 +2,8 @@
 // are loops on the host, because they have to be constant expressions as well.
 #pragma once
 
+#include <taut/core/exec/side_by_side.hpp>
+
 #include <Kokkos_Core.hpp>
 
 namespace taut {
@@ -23,9 +25,7 @@ template <int n, class Holds>
 KOKKOS_FORCEINLINE_FUNCTION unsigned bits_where(Holds const& holds) {
   static_assert(0 < n && n <= 32);
   unsigned bits = 0;
-#if defined(__GNUC__) && !defined(__CUDACC__)
-#pragma GCC unroll 1  // what is written out is not put side by side
-#endif
+  TAUT_SIDE_BY_SIDE
   for (int b = 0; b < n; ++b) bits |= static_cast<unsigned>(holds(b)) << b;
   return bits;
 }

@@ -146,6 +146,8 @@ struct ApplyAggregate {
   Kokkos::View<Storage const*, typename S::memory> factor;
   VectorField<R, S> r, z;
   int run;
+  Storage scale = 1;
+  bool add = false;
 
   KOKKOS_FUNCTION std::size_t scratch_size() const {
     return sizeof(Storage) * std::size_t(6 * run);
@@ -172,7 +174,9 @@ struct ApplyAggregate {
       Triangle::transposed(g, y, column, rows, sum);
       for (int k = 0; k < Triangle::group; ++k) {
         int const t = column + k;
-        if (t < own) z(first + t / 3, t % 3) = R(sum[k]);
+        if (t >= own) continue;
+        R& to = z(first + t / 3, t % 3);
+        to = (add ? to : R(0)) + R(scale * sum[k]);
       }
     });
   }
@@ -187,12 +191,16 @@ class AggregateInverse {
 public:
   AggregateInverse() = default;
   explicit AggregateInverse(int unknowns, int run = 32, int team = 0)
-      : run_(run), count_((unknowns + run - 1) / run), team_(team) {
-    if (run < 8 || run % 8 != 0) {
-      throw Error("additive Schwarz: aggregates of {} unknowns; take 8, 16, 24 or 32", run);
-    }
+      : unknowns_(unknowns), run_(run), count_((unknowns + run - 1) / run), team_(team) {
+    check_run(run);
     factor_ = Kokkos::View<Storage*, typename S::memory>(
         "aggregate_inverse", std::size_t(kernels::PackedTriangle::row(3 * run)) * count_);
+  }
+
+  /// Throws Error unless the kernels can hold aggregates of that many.
+  static void check_run(int run) {
+    if (run >= 8 && run % 8 == 0) return;
+    throw Error("Schwarz: aggregates of {} unknowns; take 8, 16, 24 or 32", run);
   }
 
   /// Inverts the diagonal blocks of A, of which the lower triangle is read; returns how many pivots
@@ -215,15 +223,17 @@ public:
     return floored;
   }
 
-  /// z = the block-diagonal inverse times r. Allocates nothing.
+  /// z = scale times the block-diagonal inverse times r, or z += the same. Allocates nothing.
   template <class R>
-  void apply(VectorField<R, S> const& r, VectorField<R, S> const& z) const {
-    kernels::ApplyAggregate<S, Storage, R> const kernel{factor_, r, z, run_};
+  void apply(VectorField<R, S> const& r, VectorField<R, S> const& z, double scale = 1,
+             bool add = false) const {
+    kernels::ApplyAggregate<S, Storage, R> const kernel{factor_, r, z, run_, Storage(scale), add};
     int const bytes = static_cast<int>(kernel.scratch_size());
     Kokkos::parallel_for(label("schwarz_apply"),
                          policy().set_scratch_size(0, Kokkos::PerTeam(bytes)), kernel);
   }
 
+  int unknowns() const { return unknowns_; }
   int aggregates() const { return count_; }
   std::size_t memory() const { return factor_.span() * sizeof(Storage); }
 
@@ -233,7 +243,7 @@ private:
     return typename S::team_policy(S::instance(), count_, Kokkos::AUTO);
   }
 
-  int run_ = 0, count_ = 0, team_ = 0;
+  int unknowns_ = 0, run_ = 0, count_ = 0, team_ = 0;
   Kokkos::View<Storage*, typename S::memory> factor_;
 };
 

@@ -4,28 +4,47 @@
 
 #include <taut/core/sparse/block_csr.hpp>
 
+#include <string>
 #include <type_traits>
 
 namespace taut {
 namespace kernels {
+
+/// A x in row i.
+template <class S, class T, class X>
+KOKKOS_FORCEINLINE_FUNCTION auto row_product(BlockCsr<S, T> const& a, VectorField<X, S> const& x,
+                                             int i) {
+  using Sum = std::common_type_t<T, X>;
+  Vec3<Sum> sum{};
+  int const last = a.row_begin(i + 1);
+  for (int k = a.row_begin(i); k < last; ++k) {
+    int const j = a.column(k);
+    Mat3<T> const& b = a.block(k);
+    for (int c = 0; c < 3; ++c) {
+      Sum const xc = x(j, c);
+      for (int r = 0; r < 3; ++r) sum[r] += Sum(b(r, c)) * xc;
+    }
+  }
+  return sum;
+}
 
 template <class S, class T, class X>
 struct BlockRowProduct {
   BlockCsr<S, T> a;
   VectorField<X, S> x, y;
   KOKKOS_FUNCTION void operator()(int i) const {
-    using Sum = std::common_type_t<T, X>;
-    Sum sum[3] = {};
-    int const last = a.row_begin(i + 1);
-    for (int k = a.row_begin(i); k < last; ++k) {
-      int const j = a.column(k);
-      Mat3<T> const& b = a.block(k);
-      for (int c = 0; c < 3; ++c) {
-        Sum const xc = x(j, c);
-        for (int r = 0; r < 3; ++r) sum[r] += Sum(b(r, c)) * xc;
-      }
-    }
+    auto const sum = row_product(a, x, i);
     for (int r = 0; r < 3; ++r) y(i, r) = X(sum[r]);
+  }
+};
+
+template <class S, class T, class X>
+struct RowResidual {
+  BlockCsr<S, T> a;
+  VectorField<X, S> x, b, r;
+  KOKKOS_FUNCTION void operator()(int i) const {
+    auto const sum = row_product(a, x, i);
+    for (int c = 0; c < 3; ++c) r(i, c) = X(b(i, c) - sum[c]);
   }
 };
 
@@ -69,6 +88,15 @@ struct LargestEntry {
   }
 };
 
+template <class S, class T>
+struct CopyBlocks {
+  Kokkos::View<Mat3<double>*, typename S::memory> from;
+  Kokkos::View<Mat3<T>*, typename S::memory> to;
+  KOKKOS_FUNCTION void operator()(int k) const {
+    for (int m = 0; m < 9; ++m) to(k).a[m] = T(from(k).a[m]);
+  }
+};
+
 }  // namespace kernels
 
 /// y = A x. Sums in the wider of the scalars of A and x.
@@ -77,10 +105,30 @@ void product(BlockCsr<S, T> const& a, VectorField<X, S> const& x, VectorField<X,
   for_each<S>("block_csr_product", a.rows(), kernels::BlockRowProduct<S, T, X>{a, x, y});
 }
 
+/// r = b - A x, the same way.
+template <class S, class T, class X>
+void residual(BlockCsr<S, T> const& a, VectorField<X, S> const& x, VectorField<X, S> const& b,
+              VectorField<X, S> const& r) {
+  for_each<S>("block_csr_residual", a.rows(), kernels::RowResidual<S, T, X>{a, x, b, r});
+}
+
 /// The diagonal blocks of A, of which the symmetric parts are taken.
 template <class S, class T, class R>
 void diagonal_blocks(BlockCsr<S, T> const& a, BlockField<R, S> const& diagonal) {
   for_each<S>("block_csr_diagonal", a.rows(), kernels::DiagonalBlocks<S, T, R>{a, diagonal});
+}
+
+/// A copy in another scalar, or in the same one; the pattern is shared.
+template <class T, class S>
+BlockCsr<S, T> copy_as(BlockCsr<S, double> const& a) {
+  BlockCsr<S, T> to;
+  to.row_begin = a.row_begin;
+  to.column = a.column;
+  to.block = decltype(to.block)(
+      Kokkos::view_alloc(Kokkos::WithoutInitializing, std::string("block")), a.block.extent(0));
+  for_each<S>("copy_blocks", static_cast<int>(a.block.extent(0)),
+              kernels::CopyBlocks<S, T>{a.block, to.block});
+  return to;
 }
 
 /// max |A - A'| / max |A|, entry by entry; infinity if a stored block has no mirror image.

@@ -120,7 +120,7 @@ TEST_CASE("a singular Hessian: conjugate gradients manage, the direct solver say
   CHECK(chain.value(y) < before);
 }
 
-TEST_CASE("Newton runs with additive Schwarz, in mixed and in single precision") {
+TEST_CASE("Newton runs with Schwarz, in mixed and in single precision") {
   auto const check = [](auto precision, double tolerance) {
     using P = decltype(precision);
     Chain<toy::Barrier, P> chain({.size = 200});

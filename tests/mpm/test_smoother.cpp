@@ -1,5 +1,5 @@
 // Smoothers that are polynomials, their bounds, and that threads do not matter to any.
-#include <Eigen/Eigenvalues>
+#include <Eigen/Core>
 #include <catch2/catch_test_macros.hpp>
 #include <taut/mpm/smoother.hpp>
 
@@ -64,35 +64,6 @@ TEST_CASE("Jacobi and Chebyshev are polynomials in D^-1 A", "[grid_matrix]") {
   Eigen::VectorXd const twice =
       eigenvectors * factor.cwiseProduct(factor).cwiseProduct(coefficients);
   CHECK((exact - flat(v.x, n) - twice).norm() < 1e-12 * exact.norm());
-}
-
-TEST_CASE("the largest eigenvalue of a tridiagonal matrix", "[grid_matrix]") {
-  CHECK(largest_tridiagonal({3}, {}) == 3);
-  // 2 - 2 cos(k pi / (n + 1))
-  std::vector<double> const diagonal(50, 2), beside(49, -1);
-  CHECK(std::abs(largest_tridiagonal(diagonal, beside) - (2 - 2 * std::cos(50 * M_PI / 51))) <
-        1e-13);
-  CHECK(largest_tridiagonal({1, 5, 2}, {0, 0}) == 5);
-}
-
-TEST_CASE("the residual of a Ritz value is that of its vector", "[grid_matrix]") {
-  std::mt19937 random(5);
-  std::uniform_real_distribution<double> number(0.5, 2);
-  for (int n = 1; n <= 12; ++n) {
-    std::vector<double> diagonal(n), beside(n);
-    Eigen::MatrixXd matrix = Eigen::MatrixXd::Zero(n + 1, n + 1);
-    for (int i = 0; i < n; ++i) {
-      diagonal[i] = matrix(i, i) = number(random);
-      beside[i] = matrix(i, i + 1) = matrix(i + 1, i) = number(random);
-    }
-    Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> const eigen(matrix.topLeftCorner(n, n));
-    Eigen::VectorXd vector = Eigen::VectorXd::Zero(n + 1);
-    vector.head(n) = eigen.eigenvectors().col(n - 1);
-    double const largest = eigen.eigenvalues()(n - 1);
-    auto const [value, residual] = largest_ritz_value(diagonal, beside);
-    CHECK(std::abs(value - largest) < 1e-13 * largest);
-    CHECK(std::abs(residual - (matrix * vector - largest * vector).norm()) < 1e-9 * largest);
-  }
 }
 
 TEST_CASE("one block is cut in the same pieces by one thread and by many", "[grid_matrix]") {

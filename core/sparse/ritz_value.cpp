@@ -1,6 +1,7 @@
-#include <taut/mpm/spectrum.hpp>
+#include <taut/core/sparse/ritz_value.hpp>
 
 #include <algorithm>
+#include <cmath>
 
 namespace taut {
 
@@ -45,6 +46,15 @@ RitzValue largest_ritz_value(std::vector<double> const& diagonal,
     square += next * next;
   }
   return {value, beside[n - 1] * std::abs(last) / std::sqrt(square)};
+}
+
+RitzValue LanczosByConjugates::add(double alpha, double beta) {
+  beta = std::max(beta, 0.0);
+  diagonal_.push_back(1 / alpha + beta_ / alpha_);
+  beside_.push_back(std::sqrt(beta) / alpha);
+  alpha_ = alpha;
+  beta_ = beta;
+  return largest_ritz_value(diagonal_, beside_);
 }
 
 }  // namespace taut
