@@ -66,16 +66,17 @@ Outcome<Fp64> solution(Task const& task) {
   return exact;
 }
 
-/// Error over estimate.
+/// Error over estimate, and after how many iterations.
 template <class P, class Method>
 double ratio(Task const& task, std::string const& preconditioner, double tolerance,
-             Outcome<Fp64> const& exact) {
+             Outcome<Fp64> const& exact, int* iterations = nullptr) {
   typename Method::Params params;
   params.preconditioner = AnyPreconditioner<P>::by_name(preconditioner);
   params.stop.tolerance = tolerance;
   params.budget.max_iterations = 3000;
   auto const outcome = solve<P, Method>(task, params);
   CAPTURE(task.young, preconditioner, tolerance, outcome.report.iterations);
+  if (iterations != nullptr) *iterations = outcome.report.iterations;
   // Where precision forbids to converge it says so, and what it has reached instead.
   bool const exhausted = outcome.report.stop == Stop::stalled && !std::same_as<P, Fp64>;
   CHECK((outcome.report.converged() || exhausted));
@@ -110,10 +111,14 @@ TEST_CASE("a cantilever is not at rest before its tip has sunk") {
     double const cg = ratio<Fp64, Cg<Fp64>>(task, preconditioner, 1e-3, exact);
     CHECK(cg < 3);
     CHECK(cg > 0.01);
-    double const bfgs = ratio<Fp64, Bfgs<Fp64>>(task, preconditioner, 1e-3, exact);
+    int iterations = 0;
+    double const bfgs = ratio<Fp64, Bfgs<Fp64>>(task, preconditioner, 1e-3, exact, &iterations);
     CHECK(bfgs < 3);
-    // On the levels of Schwarz it is done before a window is full.
-    if (preconditioner == "block_jacobi") CHECK(bfgs > 0.01);
+    CAPTURE(preconditioner, bfgs, iterations);
+    CHECK(bfgs > 1e-4);
+    // What is left falls by more than ten within the window of 8 where all takes but a few of
+    // these: on the levels of Schwarz. The estimate is of where the window begins.
+    CHECK((bfgs > 0.01 || iterations < 3 * 8));
   }
   CHECK(ratio<Mixed, Cg<Mixed>>(task, "block_jacobi", 1e-3, exact) < 3);
 }

@@ -207,7 +207,7 @@ TEST_CASE("one aggregate that covers everything is the inverse") {
 }
 
 TEST_CASE("Schwarz equals its formula") {
-  int const aggregate = GENERATE(8, 32);
+  int const aggregate = GENERATE(8, 16, 24, 32);
   bool const multiplicative = GENERATE(false, true), turns = GENERATE(false, true);
   auto const a = lattice_matrix<SerialSpace>(5, 0.01);  // 125 unknowns: the last aggregate is short
   SECTION("of free unknowns") {}
@@ -228,6 +228,12 @@ TEST_CASE("Schwarz equals its formula") {
   auto const full = DenseLevels::eigen(dense(a));
   CHECK(difference(applied(schwarz, g),
                    levels.inverse(full, DenseLevels::motions(full, x), multiplicative), g) < 1e-8);
+  // Of one level it is the aggregates alone.
+  auto const alone = make<Precise<SerialSpace>>(
+      a, {.levels = {.aggregate = aggregate, .multiplicative = multiplicative, .max_levels = 1}},
+      x);
+  CHECK_FALSE(alone.levels().has_coarse_level());
+  CHECK(difference(applied(alone, g), DenseLevels::block_inverse(full, 3 * aggregate), g) < 1e-8);
 }
 
 TEST_CASE("Schwarz equals its formula on three levels, with runs of one body each") {
